@@ -1,0 +1,82 @@
+"""Values of conditions: constants, arrays, or functions of position and time."""
+
+import functools
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..fields import clock_structure
+from ..space import Space
+from .base import Assembly
+
+
+@functools.cache
+def _make_evaluate(space: Space, components: int, function: Any) -> Any:
+    real, vec, value = space.real, space.vec, space.row(components)
+    Clock = clock_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def evaluate(
+        indices: wp.array(dtype=wp.int32),
+        x: wp.array(dtype=vec),
+        clock: Clock,
+        fraction: wp.float64,
+        out: wp.array(dtype=value),
+    ):
+        k = wp.tid()
+        t = clock.t[0] + fraction * clock.dt[0]
+        out[k] = value(function(x[indices[k]], real(t)))
+
+    return evaluate
+
+
+class Value:
+    """Rows of ``components`` reals for k particles, kept on the device.
+
+    Args:
+        assembly: the particles.
+        indices: those it is for, (k,).
+        components: reals in a row.
+        given: a number or (components,) for all; (k, components), or (k,) when components is 1, one each; a
+            ``wp.func`` (x, t) -> row, evaluated on the device; or a Python function (x (k, dim), t) -> any of these
+            shapes, evaluated on the host each step (slower: it reads the device).
+        who: named in errors.
+    """
+
+    def __init__(self, assembly: Assembly, indices: np.ndarray, components: int, given: Any, who: str):
+        self.space, self.device, self.components, self.who = assembly.space, assembly.device, components, who
+        self.numpy_indices = indices
+        self.indices = wp.array(indices, dtype=wp.int32, device=assembly.device)
+        self.rows = wp.zeros(len(indices), dtype=self.space.row(components), device=assembly.device)
+        self.function = given if callable(given) else None
+        self.on_device = isinstance(given, wp.Function)
+        if self.function is None:
+            self.rows.assign(self._broadcast(given))
+        elif not self.on_device:
+            self._broadcast(given(assembly.X[indices], 0.0))  # a wrong function fails now, not in the first step
+
+    def at(self, x: wp.array, clock: Any, fraction: float) -> wp.array:
+        """The rows at positions ``x`` [m] and time t + fraction · Δt, (k,)."""
+        if self.on_device:
+            kernel = _make_evaluate(self.space, self.components, self.function)
+            wp.launch(kernel, len(self.indices), [self.indices, x, clock, fraction, self.rows], device=self.device)
+        elif self.function is not None:
+            t = float(clock.t.numpy()[0]) + fraction * float(clock.dt.numpy()[0])
+            self.rows.assign(self._broadcast(self.function(x.numpy()[self.numpy_indices], t)))
+        return self.rows
+
+    def _broadcast(self, given: Any) -> np.ndarray:
+        count = len(self.numpy_indices)
+        values = np.asarray(given, dtype=self.space.numpy)
+        if not np.isfinite(values).all():
+            raise ValueError(f"{self.who}: values must be finite, got {given}")
+        if self.components == 1 and values.ndim == 1 and len(values) == count:
+            values = values[:, None]
+        try:
+            return np.ascontiguousarray(np.broadcast_to(values, (count, self.components)))
+        except ValueError:
+            raise ValueError(
+                f"{self.who}: values must be a number, ({self.components},) or ({count}, {self.components}), "
+                f"got shape {values.shape}"
+            ) from None

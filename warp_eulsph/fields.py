@@ -1,0 +1,114 @@
+"""The table of array fields, and the ``wp.struct`` types made from it.
+
+Every array that kernels share stands in one table below with its kind, unit and meaning; ``structure`` makes the Warp
+struct of a group and ``allocate`` its arrays, so that the table cannot drift from the code. Shapes: ``real`` (n,),
+``vec`` (n,) of (dim,), ``mat`` (n,) of (dim, dim); ``int`` (n,).
+"""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from .space import Space
+
+
+class Field(NamedTuple):
+    """One array field: kind (real, vec, mat, int), SI unit and meaning."""
+
+    kind: str
+    unit: str
+    meaning: str
+
+
+PARTICLES = {
+    "mass": Field("real", "kg", "mass, fixed (per metre of depth in 2-D, per square metre in 1-D)"),
+    "V0": Field("real", "m^d", "initial volume"),
+    "h": Field("real", "m", "smoothing length, dilation times spacing"),
+    "spacing": Field("real", "m", "initial particle spacing"),
+    "body": Field("int", "-", "number of the body; only particles of one body are neighbours"),
+}
+STATE = {
+    "x": Field("vec", "m", "position"),
+    "v": Field("vec", "m/s", "velocity"),
+    "F": Field("mat", "-", "deformation gradient from the initial configuration, as the material carries it"),
+    "surface": Field("vec", "m^(d-1)", "outward area vector s_a, zero inside the body, moved by Nanson's rule (M10)"),
+}
+REFERENCE = {
+    "x": Field("vec", "m", "position in the reference"),
+    "V": Field("real", "m^d", "volume in the reference, det(F_k) V0"),
+    "L": Field("mat", "-", "gradient correction (M3)"),
+    "F": Field("mat", "-", "deformation gradient of the reference, F_k"),
+    "row": Field("real", "kg/m^(d+2)", "sum of m_b g_ab over the neighbours (M7)"),
+}
+FLUX = {
+    "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
+    "Pi": Field("mat", "Pa", "stress times correction, Q L (M5)"),
+    "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
+    "shear_speed": Field("real", "m/s", "shear-wave speed measured in the reference"),
+}
+FORCES = {
+    "internal": Field("vec", "N", "internal force -T of the dual divergence (M5)"),
+    "correction": Field("vec", "N", "force of the closed pair areas (M10, M11, M12)"),
+    "dissipation": Field("vec", "N", "upwind dissipation (M9)"),
+    "external": Field("vec", "N", "body forces, tractions, pressures"),
+    "reaction": Field("vec", "N", "force that the imposed velocities took, mean over the step"),
+}
+GROUPS = {"Particles": PARTICLES, "State": STATE, "Reference": REFERENCE, "Flux": FLUX, "Forces": FORCES}
+
+
+def element(space: Space, kind: str) -> Any:
+    """Warp type of one element of a field of this kind."""
+    return {"real": space.real, "vec": space.vec, "mat": space.mat, "int": wp.int32}[kind]
+
+
+@functools.cache
+def structure(space: Space, group: str) -> Any:
+    """The ``wp.struct`` of a group of fields."""
+    annotations = {name: wp.array(dtype=element(space, field.kind)) for name, field in GROUPS[group].items()}
+    return wp.struct(type(group, (), {"__annotations__": annotations, "__module__": __name__}))
+
+
+def allocate(space: Space, group: str, n: int, device: Any) -> Any:
+    """An instance of a group's struct with zeroed arrays of ``n`` particles."""
+    fields = structure(space, group)()
+    for name, field in GROUPS[group].items():
+        setattr(fields, name, wp.zeros(n, dtype=element(space, field.kind), device=device))
+    return fields
+
+
+@functools.cache
+def neighbour_structure(space: Space) -> Any:
+    """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.
+
+    ``g`` is the pair weight g_ab = −W'(r)/r [1/m^(d+2)], so that ∇W_ab = g_ab (x_b − x_a); ``box`` [m] holds the
+    lengths of the periodic box, zero where it is open.
+    """
+
+    @wp.struct
+    class Neighbours:
+        start: wp.array(dtype=wp.int32)
+        index: wp.array(dtype=wp.int32)
+        g: wp.array(dtype=space.real)
+        box: space.vec
+
+    return Neighbours
+
+
+@functools.cache
+def clock_structure(space: Space) -> Any:
+    """Time on the device, so that a recorded step stays valid: arrays of one element.
+
+    ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``target`` [s] time that
+    must be hit, ``rate`` [1/s] largest wave speed over spacing.
+    """
+
+    @wp.struct
+    class Clock:
+        t: wp.array(dtype=wp.float64)
+        dt: wp.array(dtype=wp.float64)
+        free_dt: wp.array(dtype=wp.float64)
+        target: wp.array(dtype=wp.float64)
+        rate: wp.array(dtype=space.real)
+
+    return Clock

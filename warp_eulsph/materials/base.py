@@ -1,0 +1,75 @@
+"""What a material declares."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+from ..space import Space
+
+
+class Law(NamedTuple):
+    """The point functions of a material in one space, all ``wp.func``.
+
+    Attributes:
+        Constants: ``wp.struct`` of scalars that the functions take.
+        stress: (F, constants) -> P, first Piola–Kirchhoff stress [Pa].
+        energy: (F, constants) -> Ψ, stored energy per initial volume [J/m^d].
+        wave_moduli: (F, constants) -> (M, μ): ρ0 c_p² and ρ0 c_s² [Pa] of the fastest waves, c in the current
+            configuration.
+        carry: (F, constants) -> F, what the material keeps of an updated F; None keeps all of it. A fluid keeps
+            det(F)^(1/d) I: its F would grow without bound in shear (METHOD: materials in a moving reference).
+    """
+
+    Constants: Any
+    stress: Any
+    energy: Any
+    wave_moduli: Any
+    carry: Any = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material(ABC):
+    """A constitutive law; frozen, so that it can key cached kernels.
+
+    In 2-D plane strain and in 1-D uniaxial strain: the 3-D law with the missing stretches equal to one.
+
+    A new material is one file: a subclass with its parameters, ``constants`` and ``law``.
+
+    Args:
+        density: initial density ρ0 [kg/m³].
+    """
+
+    density: float
+
+    #: The carried F is not the total deformation gradient, so the reference must be refreshed every step.
+    needs_moving_reference: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        positive("density", self.density, "kg/m^3")
+
+    @abstractmethod
+    def constants(self) -> dict[str, float]:
+        """Values of the fields of ``Law.Constants``."""
+
+    @abstractmethod
+    def law(self, space: Space) -> Law:
+        """Point functions in this space, cached: the same objects for the same space."""
+
+
+def positive(name: str, value: float, unit: str) -> None:
+    """Raise unless ``value`` is a finite positive number."""
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} must be positive and finite, got {value} {unit}")
+
+
+def lame_constants(young: float, poisson: float) -> tuple[float, float]:
+    """Shear modulus μ and bulk modulus κ [Pa] from Young's modulus E [Pa] and Poisson's ratio ν.
+
+    Raises:
+        ValueError: E not positive, or ν outside (−1, 0.5).
+    """
+    positive("young", young, "Pa")
+    if not -1.0 < poisson < 0.5:
+        raise ValueError(f"poisson ratio must be in (-1, 0.5), got {poisson}; use 0.49 to 0.499 for rubber")
+    return young / (2.0 * (1.0 + poisson)), young / (3.0 * (1.0 - 2.0 * poisson))

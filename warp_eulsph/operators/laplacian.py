@@ -1,0 +1,155 @@
+"""Graph Laplacian of the neighbour list, and conjugate gradients on it."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..fields import neighbour_structure, structure
+from ..reduce import Sum
+from ..space import Space
+
+
+@functools.cache
+def _make_apply(space: Space) -> Any:
+    real, vec = space.real, space.vec
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def apply_laplacian(
+        reference: Reference,
+        near: Neighbours,
+        f: wp.array(dtype=vec),
+        out: wp.array(dtype=vec),
+        diagonal: wp.array(dtype=real),
+        product: wp.array(dtype=vec),
+    ):
+        a = wp.tid()
+        f_a = f[a]
+        total = vec()
+        weights = real(0.0)
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            omega = reference.V[b] * near.g[k]
+            weights += omega
+            total += (f_a - f[b]) * omega
+        out[a] = total * reference.V[a]
+        diagonal[a] = weights * reference.V[a]
+        product[a] = wp.cw_mul(f_a, out[a])
+
+    return apply_laplacian
+
+
+@functools.cache
+def safe_ratio(space: Space) -> Any:
+    """``wp.func`` component-wise n/d, zero where d is zero: a converged direction stops moving."""
+    real, vec, dim = space.real, space.vec, space.dim
+
+    @wp.func
+    def safe_ratio(numerator: vec, denominator: vec) -> vec:
+        ratio = vec()
+        for i in range(wp.static(dim)):
+            if denominator[i] != real(0.0):
+                ratio[i] = numerator[i] / denominator[i]
+        return ratio
+
+    return safe_ratio
+
+
+@functools.cache
+def _make_advance(space: Space, start: bool) -> Any:
+    """Kernel: x and residual along the search direction (or the first residual), preconditioned residual."""
+    real, vec = space.real, space.vec
+    ratio = safe_ratio(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def advance(
+        rz: wp.array(dtype=vec),
+        pAp: wp.array(dtype=vec),
+        diagonal: wp.array(dtype=real),
+        Ap: wp.array(dtype=vec),
+        p: wp.array(dtype=vec),
+        x: wp.array(dtype=vec),
+        r: wp.array(dtype=vec),
+        z: wp.array(dtype=vec),
+        product: wp.array(dtype=vec),
+    ):
+        a = wp.tid()
+        if wp.static(start):
+            r[a] = r[a] - Ap[a]
+        else:
+            alpha = ratio(rz[0], pAp[0])
+            x[a] = x[a] + wp.cw_mul(alpha, p[a])
+            r[a] = r[a] - wp.cw_mul(alpha, Ap[a])
+        z_a = vec()
+        if diagonal[a] > real(0.0):
+            z_a = r[a] / diagonal[a]
+        z[a] = z_a
+        product[a] = wp.cw_mul(r[a], z_a)
+        if wp.static(start):
+            p[a] = z_a
+
+    return advance
+
+
+@functools.cache
+def _make_turn(space: Space) -> Any:
+    """Kernel: the next search direction."""
+    vec = space.vec
+    ratio = safe_ratio(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def turn(rz: wp.array(dtype=vec), rz_old: wp.array(dtype=vec), z: wp.array(dtype=vec), p: wp.array(dtype=vec)):
+        a = wp.tid()
+        p[a] = z[a] + wp.cw_mul(ratio(rz[0], rz_old[0]), p[a])
+
+    return turn
+
+
+class LaplacianSolver:
+    """Σ_b ω_ab (ψ_a − ψ_b) = d_a with ω_ab = V_a V_b g_ab, one right-hand side per direction (M11).
+
+    Preconditioned conjugate gradients with a fixed number of iterations and no host reads; ``psi`` keeps the last
+    solution as the next first guess.
+    """
+
+    def __init__(self, space: Space, n: int, device: Any):
+        self.space, self.device = space, device
+        vector = functools.partial(wp.zeros, dtype=space.vec, device=device)
+        self.psi, self.residual = vector(n), vector(n)
+        self._p, self._Ap, self._z, self._product = vector(n), vector(n), vector(n), vector(n)
+        self._diagonal = wp.zeros(n, dtype=space.real, device=device)
+        self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1)
+        self._sum = Sum(space.vec, device)
+
+    def solve(self, reference: Any, near: Any, iterations: int) -> None:
+        """Improve ``psi`` for the right-hand side in ``residual``, which becomes the residual."""
+        self._apply(reference, near, self.psi)
+        self._advance(start=True)
+        self._sum(self._product, self._rz)
+        for _ in range(iterations):
+            self._apply(reference, near, self._p)
+            self._sum(self._product, self._pAp)
+            self._advance(start=False)
+            self._rz, self._rz_old = self._rz_old, self._rz
+            self._sum(self._product, self._rz)
+            turn = [self._rz, self._rz_old, self._z, self._p]
+            wp.launch(_make_turn(self.space), len(self.psi), turn, device=self.device)
+
+    def _apply(self, reference: Any, near: Any, f: wp.array) -> None:
+        arguments = [reference, near, f, self._Ap, self._diagonal, self._product]
+        wp.launch(_make_apply(self.space), len(f), arguments, device=self.device)
+
+    def _advance(self, start: bool) -> None:
+        arguments = [
+            self._rz,
+            self._pAp,
+            self._diagonal,
+            self._Ap,
+            self._p,
+            self.psi,
+            self.residual,
+            self._z,
+            self._product,
+        ]
+        wp.launch(_make_advance(self.space, start), len(self.psi), arguments, device=self.device)

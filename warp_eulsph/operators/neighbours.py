@@ -1,0 +1,166 @@
+"""Neighbour lists: ``wp.HashGrid`` once per reference, then compressed rows that every sum walks."""
+
+import functools
+import logging
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..fields import neighbour_structure
+from ..space import Space, difference
+from ..weights import Weight
+
+log = logging.getLogger(__name__)
+
+# Cell coordinates are rounded, distances are tested exactly: a query a little too wide misses nothing.
+QUERY_MARGIN = 1.001
+
+
+@functools.cache
+def _make_pad(space: Space) -> Any:
+    """Kernel: positions as the 3-vectors that HashGrid takes, wrapped into the periodic box."""
+    real, vec, dim = space.real, space.vec, space.dim
+    vec3 = wp.types.vector(length=3, dtype=real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pad(x: wp.array(dtype=vec), box: vec, out: wp.array(dtype=vec3)):
+        a = wp.tid()
+        p = vec3()
+        for i in range(wp.static(dim)):
+            p[i] = x[a][i]
+            if box[i] > real(0.0):
+                p[i] = p[i] - box[i] * wp.floor(p[i] / box[i])
+        out[a] = p
+
+    return pad
+
+
+@functools.cache
+def _make_search(space: Space, fill: bool) -> Any:
+    """Kernel: count a row's neighbours, or (``fill``) write them sorted by index."""
+    real, vec, dim = space.real, space.vec, space.dim
+    vec3 = wp.types.vector(length=3, dtype=real)
+    separation = difference(space)
+    images = 3 if space.periodic else 1
+    shifts_y, shifts_z = (images if dim > 1 else 1), (images if dim > 2 else 1)
+    first = -1 if space.periodic else 0
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def search(
+        grid: wp.uint64,
+        padded: wp.array(dtype=vec3),
+        x: wp.array(dtype=vec),
+        h: wp.array(dtype=real),
+        body: wp.array(dtype=wp.int32),
+        box: vec,
+        support: real,
+        h_max: real,
+        count: wp.array(dtype=wp.int32),
+        start: wp.array(dtype=wp.int32),
+        index: wp.array(dtype=wp.int32),
+    ):
+        a = wp.tid()
+        reach = support * real(0.5) * (h[a] + h_max) * real(QUERY_MARGIN)
+        n = 0
+        row = 0
+        if wp.static(fill):
+            row = start[a]
+        for ix in range(wp.static(images)):
+            for iy in range(wp.static(shifts_y)):
+                for iz in range(wp.static(shifts_z)):
+                    p = padded[a]
+                    shift = wp.vec3i(ix + first, iy + first, iz + first)
+                    inside = True
+                    for i in range(wp.static(dim if space.periodic else 0)):
+                        if shift[i] != 0:
+                            p[i] = p[i] + box[i] * real(shift[i])
+                            inside = inside and box[i] > real(0.0) and p[i] > -reach and p[i] < box[i] + reach
+                    if inside:
+                        for b in wp.hash_grid_query(grid, p, reach, body[a]):
+                            if b != a and body[b] == body[a]:
+                                r = wp.length(separation(x[b], x[a], box))
+                                if r < support * real(0.5) * (h[a] + h[b]):
+                                    if wp.static(fill):
+                                        k = row + n
+                                        while k > row and index[k - 1] > b:
+                                            index[k] = index[k - 1]
+                                            k = k - 1
+                                        index[k] = b
+                                    n = n + 1
+        if wp.static(not fill):
+            count[a] = n
+
+    return search
+
+
+class NeighbourLists:
+    """Symmetric neighbour lists of one particle set, rebuilt in place; grows when a configuration needs more room.
+
+    Two particles are neighbours when they are of the same body and closer than support · (h_a + h_b)/2.
+
+    Args:
+        space: dimension, precision, periodicity.
+        weight: its support radius bounds the lists.
+        h: smoothing lengths [m], (n,).
+        body: body numbers, (n,).
+        box: lengths of the periodic box [m], zero where open.
+        device: Warp device.
+    """
+
+    def __init__(self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any):
+        self.space, self.device = space, device
+        self.h, self.body, self.box = h, body, space.vec(*box)
+        n = len(h)
+        lengths = h.numpy()
+        self.support, self.h_max = weight.support, float(lengths.max())
+        for i, length in enumerate(box):
+            if 0.0 < length < 2.0 * self.support * self.h_max:
+                raise ValueError(
+                    f"periodic box length along axis {i} must be at least twice the support radius "
+                    f"({2 * self.support * self.h_max:.6g} m), got {length:.6g} m; enlarge the box or refine"
+                )
+        side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
+        self.grid = wp.HashGrid(
+            side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
+        )
+        self.padded = wp.zeros(n, dtype=wp.types.vector(length=3, dtype=space.real), device=device)
+        self.count = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self.rows = neighbour_structure(space)()
+        self.rows.box = self.box
+        self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self._reserve(0)
+
+    @property
+    def capacity(self) -> int:
+        """Pairs that fit without growing."""
+        return len(self.rows.index)
+
+    @property
+    def pairs(self) -> int:
+        """Directed pairs (a, b) in the lists; reads the device."""
+        return int(self.rows.start[-1:].numpy()[0])
+
+    def _reserve(self, pairs: int) -> None:
+        self.rows.index = wp.zeros(pairs, dtype=wp.int32, device=self.device)
+        self.rows.g = wp.zeros(pairs, dtype=self.space.real, device=self.device)
+
+    def build(self, x: wp.array) -> None:
+        """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.g`` is left to be computed."""
+        n = len(x)
+        wp.launch(_make_pad(self.space), n, [x, self.box, self.padded], device=self.device)
+        cell = self.support * self.h_max * QUERY_MARGIN
+        self.grid.build(self.padded, cell, groups=self.body)
+        self._launch(x, fill=False)
+        wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
+        pairs = self.pairs
+        if pairs > self.capacity:
+            # A quarter more than needed, so that a moving reference grows its lists seldom.
+            self._reserve(pairs + pairs // 4)
+            log.debug("neighbour lists grew to %d pairs", self.capacity)
+        self._launch(x, fill=True)
+
+    def _launch(self, x: wp.array, fill: bool) -> None:
+        arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self.h_max]
+        arguments += [self.count, self.rows.start, self.rows.index]
+        wp.launch(_make_search(self.space, fill), len(x), arguments, device=self.device)

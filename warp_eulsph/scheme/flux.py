@@ -1,0 +1,149 @@
+"""The flux of momentum: stress in the reference, body by body (M1), and the wave speeds there."""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from ..fields import allocate, clock_structure, structure
+from ..linalg import det, inverse, symmetric_bounds
+from ..materials import Law, Material
+from ..space import Space
+
+
+@functools.cache
+def stress_in_reference(space: Space, law: Law) -> Any:
+    """``wp.func`` Q = P(F) F_kᵀ / J_k (M1); the Cauchy stress when F_k = F, P when F_k = I."""
+    mat, Constants = space.mat, law.Constants
+    stress, determinant = law.stress, det(space)
+
+    @wp.func
+    def stress_in_reference(F: mat, F_k: mat, c: Constants) -> mat:
+        return stress(F, c) @ wp.transpose(F_k) / determinant(F_k)
+
+    return stress_in_reference
+
+
+@functools.cache
+def _make_flux(space: Space, law: Law) -> Any:
+    mat = space.mat
+    Reference, Flux, Constants = structure(space, "Reference"), structure(space, "Flux"), law.Constants
+    Q_of = stress_in_reference(space, law)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def compute_flux(first: int, F: wp.array(dtype=mat), reference: Reference, c: Constants, flux: Flux):
+        a = first + wp.tid()
+        Q = Q_of(F[a], reference.F[a], c)
+        flux.Q[a] = Q
+        flux.Pi[a] = Q @ reference.L[a]
+
+    return compute_flux
+
+
+@functools.cache
+def _make_wave_speeds(space: Space, law: Law) -> Any:
+    real, mat = space.real, space.mat
+    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
+    Clock, Constants = clock_structure(space), law.Constants
+    invert, moduli, bounds = inverse(space), law.wave_moduli, symmetric_bounds(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def wave_speeds(
+        first: int,
+        F: wp.array(dtype=mat),
+        particles: Particles,
+        reference: Reference,
+        c: Constants,
+        flux: Flux,
+        clock: Clock,
+    ):
+        a = first + wp.tid()
+        # A wave of speed c runs at c |G⁻¹| when distances are measured in the reference, G = F F_k⁻¹.
+        G_inverse = reference.F[a] @ invert(F[a])
+        shortening = wp.sqrt(bounds(wp.transpose(G_inverse) @ G_inverse)[1])
+        rho_0 = particles.mass[a] / particles.V0[a]
+        M = moduli(F[a], c)
+        flux.speed[a] = wp.sqrt(wp.max(M[0], real(0.0)) / rho_0) * shortening
+        flux.shear_speed[a] = wp.sqrt(wp.max(M[1], real(0.0)) / rho_0) * shortening
+        wp.atomic_max(clock.rate, 0, flux.speed[a] / particles.spacing[a])
+
+    return wave_speeds
+
+
+@functools.cache
+def _make_energy(space: Space, law: Law) -> Any:
+    mat = space.mat
+    Particles, Constants, density = structure(space, "Particles"), law.Constants, law.energy
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def energy(first: int, F: wp.array(dtype=mat), particles: Particles, c: Constants, out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
+        out[a] = wp.float64(particles.V0[a] * density(F[a], c))
+
+    return energy
+
+
+@functools.cache
+def _make_carry(space: Space, law: Law) -> Any:
+    mat, Constants, carry_F = space.mat, law.Constants, law.carry
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def carry(first: int, F: wp.array(dtype=mat), c: Constants):
+        a = first + wp.tid()
+        F[a] = carry_F(F[a], c)
+
+    return carry
+
+
+class _Part(NamedTuple):
+    first: int
+    size: int
+    law: Law
+    constants: Any
+
+
+class Flux:
+    """Stress, wave speeds and stored energy of all bodies; one launch per body and quantity.
+
+    Args:
+        bodies: (material, number of particles) in the order of the particle arrays.
+    """
+
+    def __init__(self, space: Space, bodies: list[tuple[Material, int]], particles: Any, device: Any):
+        self.space, self.particles, self.device = space, particles, device
+        self.parts: list[_Part] = []
+        first = 0
+        for material, count in bodies:
+            law = material.law(space)
+            constants = law.Constants()
+            for name, value in material.constants().items():
+                setattr(constants, name, value)
+            self.parts.append(_Part(first, count, law, constants))
+            first += count
+        self.fields = allocate(space, "Flux", first, device)
+
+    def compute(self, F: wp.array, reference: Any) -> None:
+        """Q and Π = Q L of the deformation gradients ``F`` (M1, M5)."""
+        for part in self.parts:
+            arguments = [part.first, F, reference, part.constants, self.fields]
+            wp.launch(_make_flux(self.space, part.law), part.size, arguments, device=self.device)
+
+    def wave_speeds(self, F: wp.array, reference: Any, clock: Any) -> None:
+        """Wave speeds measured in the reference, and their largest rate [1/s] into ``clock.rate``."""
+        clock.rate.zero_()
+        for part in self.parts:
+            arguments = [part.first, F, self.particles, reference, part.constants, self.fields, clock]
+            wp.launch(_make_wave_speeds(self.space, part.law), part.size, arguments, device=self.device)
+
+    def energy(self, F: wp.array, out: wp.array) -> None:
+        """Stored energy [J] of each particle."""
+        for part in self.parts:
+            arguments = [part.first, F, self.particles, part.constants, out]
+            wp.launch(_make_energy(self.space, part.law), part.size, arguments, device=self.device)
+
+    def carry(self, F: wp.array) -> None:
+        """Reduce updated F to what each material carries, in place."""
+        for part in self.parts:
+            if part.law.carry is not None:
+                arguments = [part.first, F, part.constants]
+                wp.launch(_make_carry(self.space, part.law), part.size, arguments, device=self.device)

@@ -1,0 +1,151 @@
+"""Where the energy went: one account per mechanism, and the residual that closes the books."""
+
+import functools
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..fields import clock_structure, structure
+from ..reduce import Sum
+from ..space import Space
+from .flux import Flux
+from .reference import Configuration
+from .time_step import DeviceClock
+
+#: Energy that each mechanism added since the start [J]; negative values were dissipated.
+ACCOUNTS = ("external", "constraint", "dissipation", "correction", "stepping")
+_Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
+
+
+@functools.cache
+def _make_entries(space: Space) -> Any:
+    """Kernel: what each mechanism did to particle a in this step, by the mean velocity of the step.
+
+    With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
+    two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
+    """
+    vec, mat = space.vec, space.mat
+    Particles, Reference, State = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        structure(space, "State"),
+    )
+    Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
+    precise = wp.types.vector(length=space.dim, dtype=wp.float64)
+    precise_mat = wp.types.matrix(shape=(space.dim, space.dim), dtype=wp.float64)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def entries(
+        particles: Particles,
+        reference: Reference,
+        state: State,
+        half: State,
+        Q: wp.array(dtype=mat),
+        grad_v: wp.array(dtype=mat),
+        v_old: wp.array(dtype=vec),
+        W_old: wp.array(dtype=wide),
+        W: wp.array(dtype=wide),
+        clock: Clock,
+        forces: Forces,
+        out: wp.array(dtype=_Entry),
+    ):
+        a = wp.tid()
+        dt = clock.dt[0]
+        mass = wide(particles.mass[a])
+        v = precise(state.v[a])
+        v_mean = wide(0.5) * (precise(v_old[a]) + v)
+        impulse = (v - precise(forces.reaction[a])) * mass
+        internal = precise(forces.internal[a])
+        strain_power = wide(reference.V[a]) * wp.ddot(precise_mat(Q[a]), precise_mat(grad_v[a]))
+        stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
+        out[a] = _Entry(
+            dt * wp.dot(precise(forces.external[a]), v_mean),
+            wp.dot(impulse, v_mean),
+            dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+            dt * wp.dot(precise(forces.correction[a]), v_mean),
+            stepping,
+        )
+        if dt > wide(0.0):
+            forces.reaction[a] = vec(impulse / dt)
+        v_old[a] = state.v[a]
+        W_old[a] = W[a]
+
+    return entries
+
+
+@functools.cache
+def _make_kinetic(space: Space) -> Any:
+    Particles, vec = structure(space, "Particles"), space.vec
+    precise = wp.types.vector(length=space.dim, dtype=wp.float64)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def kinetic(particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
+        a = wp.tid()
+        v_a = precise(v[a])
+        out[a] = wp.float64(0.5) * wp.float64(particles.mass[a]) * wp.dot(v_a, v_a)
+
+    return kinetic
+
+
+@functools.cache
+def _make_book() -> Any:
+    @wp.kernel(module="unique", enable_backward=False)
+    def book(step: wp.array(dtype=_Entry), total: wp.array(dtype=_Entry)):
+        total[0] = total[0] + step[0]
+
+    return book
+
+
+class Ledger:
+    """Energy accounts on the device, booked every step in float64 and read when asked."""
+
+    def __init__(
+        self, space: Space, particles: Any, flux: Flux, configuration: Configuration, clock: DeviceClock, device: Any
+    ):
+        n = len(particles.mass)
+        self.space, self.particles, self.flux, self.device = space, particles, flux, device
+        self.configuration, self.clock = configuration, clock
+        self._v_old = wp.zeros(n, dtype=space.vec, device=device)
+        self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
+        self._entries = wp.zeros(n, dtype=_Entry, device=device)
+        self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
+        self._energy = wp.zeros(1, dtype=wp.float64, device=device)
+        self._sum_entries, self._sum = Sum(_Entry, device), Sum(wp.float64, device)
+        self.start = 0.0
+
+    def open(self, U: Any) -> None:
+        """Start the books at state ``U``."""
+        wp.copy(self._v_old, U.v)
+        self.flux.energy(U.F, self._W_old)
+        self._total.zero_()
+        self.start = self.kinetic(U) + self.stored(U)
+
+    def record(self, U: Any, half: Any, grad_v: wp.array, forces: Any) -> None:
+        """Book a step that ended in ``U``, with the half state, ∇v^{n+½} and the forces of the full step."""
+        self.flux.energy(U.F, self._W)
+        arguments = [self.particles, self.configuration.fields, U, half, self.flux.fields.Q, grad_v]
+        arguments += [self._v_old, self._W_old, self._W, self.clock.fields, forces, self._entries]
+        wp.launch(_make_entries(self.space), len(self._W), arguments, device=self.device)
+        self._sum_entries(self._entries, self._step)
+        wp.launch(_make_book(), 1, [self._step, self._total], device=self.device)
+
+    def kinetic(self, U: Any) -> float:
+        """Kinetic energy [J]; reads the device."""
+        wp.launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W], device=self.device)
+        self._sum(self._W, self._energy)
+        return float(self._energy.numpy()[0])
+
+    def stored(self, U: Any) -> float:
+        """Stored energy [J]; reads the device."""
+        self.flux.energy(U.F, self._W)
+        self._sum(self._W, self._energy)
+        return float(self._energy.numpy()[0])
+
+    def accounts(self) -> dict[str, float]:
+        """Energy that each mechanism added since the start [J]; reads the device."""
+        return dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+
+    def residual(self, U: Any) -> float:
+        """Energy that no account explains [J]; round-off if the operators are duals of each other."""
+        return self.kinetic(U) + self.stored(U) - self.start - sum(self.accounts().values())

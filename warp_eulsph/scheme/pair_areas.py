@@ -1,0 +1,178 @@
+"""Closed pair areas: the defect of the dual divergence taken back pair by pair (M11), never feeding energy (M12)."""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from ..fields import neighbour_structure, structure
+from ..operators.laplacian import LaplacianSolver
+from ..reduce import Sum
+from ..space import Space, difference
+from .dissipation import blend, upwind
+from .reference import Configuration
+
+
+@dataclass(frozen=True)
+class PairAreas:
+    """Force correction that makes a moving reference stable (M11, M12); momentum stays exact.
+
+    Args:
+        kappa: each pair's correction may feed at most ``kappa`` times what M9 dissipates in that pair (M12); 1 keeps
+            energy from growing, ``math.inf`` is M11 without a limit.
+        iterations: conjugate-gradient iterations per refresh, warm-started.
+    """
+
+    kappa: float = 1.0
+    iterations: int = 5
+
+    def __post_init__(self) -> None:
+        if not self.kappa >= 0.0:
+            raise ValueError(f"kappa must be at least 0, got {self.kappa}; 1 bounds the energy, math.inf is unlimited")
+        if self.iterations < 1:
+            raise ValueError(f"iterations must be at least 1, got {self.iterations}")
+
+    @property
+    def limited(self) -> bool:
+        """Whether M12 limits the correction."""
+        return math.isfinite(self.kappa)
+
+    def build(self, space: Space, particles: Any, counts: list[int], device: Any) -> "ClosedPairs":
+        """Allocate for bodies of ``counts`` particles."""
+        return ClosedPairs(self, space, particles, counts, device)
+
+
+@functools.cache
+def _make_defect(space: Space) -> Any:
+    """Kernel: d_a = e_a − s_a from −e_a."""
+    vec = space.vec
+    State = structure(space, "State")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def defect(minus_e: wp.array(dtype=vec), state: State):
+        a = wp.tid()
+        minus_e[a] = -minus_e[a] - state.surface[a]
+
+    return defect
+
+
+@functools.cache
+def _make_remove_mean(space: Space) -> Any:
+    real, vec = space.real, space.vec
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def remove_mean(first: int, count: int, total: wp.array(dtype=vec), out: wp.array(dtype=vec)):
+        a = first + wp.tid()
+        out[a] = out[a] - total[0] / real(count)
+
+    return remove_mean
+
+
+@functools.cache
+def admitted(space: Space) -> Any:
+    """``wp.func`` φ_ab of M12: 1 if the pair's correction takes energy, else κ δ / p capped at 1.
+
+    Args (of the function): κ, power p fed by the correction, power δ taken by the dissipation [W].
+    """
+    real = space.real
+
+    @wp.func
+    def admitted(kappa: real, p: real, delta: real) -> real:
+        phi = real(1.0)
+        if p > real(0.0):
+            phi = wp.min(real(1.0), kappa * wp.max(delta, real(0.0)) / p)
+        return phi
+
+    return admitted
+
+
+@functools.cache
+def _make_forces(space: Space, limited: bool, sensed: bool) -> Any:
+    """Kernel: M9 and the correction ½ Σ_b φ_ab (Q_a + Q_b) c_ab of M11 and M12 in one walk of the rows."""
+    real, vec, mat = space.real, space.vec, space.mat
+    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
+    Neighbours, Forces = neighbour_structure(space), structure(space, "Forces")
+    separation, pair_force, mix, share = difference(space), upwind(space), blend(space), admitted(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def dissipate_and_correct(
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        flux: Flux,
+        v: wp.array(dtype=vec),
+        grad_v: wp.array(dtype=mat),
+        epsilon: real,
+        sensor: wp.array(dtype=vec),
+        psi: wp.array(dtype=vec),
+        kappa: real,
+        forces: Forces,
+    ):
+        a = wp.tid()
+        x_a, V_a, v_a, grad_a = reference.x[a], reference.V[a], v[a], grad_v[a]
+        rho_a = particles.mass[a] / V_a
+        c_a, s_a, Q_a, psi_a = flux.speed[a], flux.shear_speed[a], flux.Q[a], psi[a]
+        dissipation = vec()
+        correction = vec()
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            V_b = reference.V[b]
+            xi = separation(reference.x[b], x_a, near.box)
+            VVg = V_a * V_b * near.g[k]
+            rho = real(0.25) * (rho_a + particles.mass[b] / V_b)
+            plain = v[b] - v_a
+            jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
+            if wp.static(sensed):
+                jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
+            else:
+                jump = jump * epsilon
+            upwind_ab = pair_force(xi, VVg, rho * (c_a + flux.speed[b]), rho * (s_a + flux.shear_speed[b]), jump)
+            f_ab = (Q_a + flux.Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * VVg))
+            if wp.static(limited):
+                f_ab = f_ab * share(kappa, -wp.dot(f_ab, plain), wp.dot(upwind_ab, plain))
+            dissipation += upwind_ab
+            correction += f_ab
+        forces.dissipation[a] = dissipation
+        forces.correction[a] = correction
+
+    return dissipate_and_correct
+
+
+class ClosedPairs:
+    """The pair areas c_ab = ω_ab (ψ_a − ψ_b) of the present reference, and the forces they correct."""
+
+    def __init__(self, option: PairAreas, space: Space, particles: Any, counts: list[int], device: Any):
+        self.option, self.space, self.particles, self.device = option, space, particles, device
+        self.solver = LaplacianSolver(space, len(particles.mass), device)
+        firsts = [sum(counts[:i]) for i in range(len(counts))]
+        self.bodies = list(zip(firsts, counts, strict=True))
+        self._sum, self._total = Sum(space.vec, device), wp.zeros(1, dtype=space.vec, device=device)
+
+    def refresh(self, configuration: Configuration, state: Any) -> None:
+        """Solve for the potentials ψ of the new reference, body by body free of a mean (M11)."""
+        defect = self.solver.residual
+        configuration.defect(defect)
+        wp.launch(_make_defect(self.space), len(defect), [defect, state], device=self.device)
+        for first, count in self.bodies:
+            self._sum(defect[first : first + count], self._total)
+            wp.launch(_make_remove_mean(self.space), count, [first, count, self._total, defect], device=self.device)
+        self.solver.solve(configuration.fields, configuration.near, self.option.iterations)
+
+    def compute(
+        self,
+        configuration: Configuration,
+        flux: Any,
+        v: wp.array,
+        grad_v: wp.array,
+        epsilon: float,
+        sensor: Any,
+        forces: Any,
+    ) -> None:
+        """Dissipation (M9) and correction (M11, M12) into ``forces``."""
+        kernel = _make_forces(self.space, self.option.limited, sensor is not None)
+        kappa = self.option.kappa if self.option.limited else 0.0
+        arguments = [self.particles, configuration.fields, configuration.near, flux, v, grad_v, epsilon]
+        arguments += [sensor if sensor is not None else v, self.solver.psi, kappa, forces]
+        wp.launch(kernel, len(v), arguments, device=self.device)

@@ -1,0 +1,162 @@
+"""The reference configuration k, and the one knob: when it is refreshed."""
+
+import functools
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from ..fields import allocate, structure
+from ..linalg import det, inverse, symmetric_bounds
+from ..operators.correction import make_correct, make_pair_sums
+from ..operators.divergence import make_divergence
+from ..operators.neighbours import NeighbourLists
+from ..space import Space
+from ..weights import Weight
+
+
+class ReferencePolicy(ABC):
+    """When the reference is refreshed: k = 0 total Lagrangian … k = n Eulerian."""
+
+    #: The initial configuration is the only reference there will be.
+    fixed = False
+
+    @abstractmethod
+    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
+        """Whether to refresh before step number ``step`` (0 is the first; the reference is fresh then)."""
+
+
+@dataclass(frozen=True)
+class Never(ReferencePolicy):
+    """Total Lagrangian: the initial configuration stays the reference."""
+
+    fixed = True
+
+    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
+        return False
+
+
+@dataclass(frozen=True)
+class Every(ReferencePolicy):
+    """Updated Lagrangian: refresh every ``steps`` steps."""
+
+    steps: int
+
+    def __post_init__(self) -> None:
+        if self.steps < 1:
+            raise ValueError(
+                f"steps between refreshes must be at least 1, got {self.steps}; Never() is total Lagrangian"
+            )
+
+    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
+        return step % self.steps == 0
+
+
+@dataclass(frozen=True)
+class Always(ReferencePolicy):
+    """Eulerian: every step starts from its own configuration."""
+
+    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
+        return True
+
+
+@dataclass(frozen=True)
+class WhenDistorted(ReferencePolicy):
+    """Updated Lagrangian by criterion: refresh when a stretch since the last refresh leaves [1/ratio, ratio].
+
+    The stretches are those of G = F F_k⁻¹; rotations do not count. Reads one number from the device each step.
+    """
+
+    ratio: float = 1.2
+
+    def __post_init__(self) -> None:
+        if not self.ratio > 1.0:
+            raise ValueError(f"distortion ratio must be greater than 1, got {self.ratio}")
+
+    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
+        return configuration.distortion(F) > self.ratio
+
+
+@functools.cache
+def _make_adopt(space: Space) -> Any:
+    State, Particles, Reference = (
+        structure(space, "State"),
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+    )
+    determinant = det(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def adopt(state: State, particles: Particles, reference: Reference):
+        a = wp.tid()
+        reference.x[a] = state.x[a]
+        reference.F[a] = state.F[a]
+        reference.V[a] = determinant(state.F[a]) * particles.V0[a]
+
+    return adopt
+
+
+@functools.cache
+def _make_distortion(space: Space) -> Any:
+    real, mat = space.real, space.mat
+    Reference = structure(space, "Reference")
+    invert, bounds = inverse(space), symmetric_bounds(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def distortion(F: wp.array(dtype=mat), reference: Reference, largest: wp.array(dtype=real)):
+        a = wp.tid()
+        G = F[a] @ invert(reference.F[a])
+        G_inverse = reference.F[a] @ invert(F[a])
+        stretch = bounds(wp.transpose(G) @ G)[1]
+        shortening = bounds(wp.transpose(G_inverse) @ G_inverse)[1]
+        wp.atomic_max(largest, 0, wp.sqrt(wp.max(stretch, shortening)))
+
+    return distortion
+
+
+class Configuration:
+    """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
+
+    Attributes:
+        fields: struct ``Reference`` of ``fields.py``.
+        lists: neighbour lists, with the pair weights g_ab.
+        poor: (n,) directions in which a particle's gradient fell back to zero; 0 is healthy.
+    """
+
+    def __init__(self, space: Space, weight: Weight, particles: Any, box: Any, device: Any):
+        n = len(particles.mass)
+        self.space, self.weight, self.particles, self.device = space, weight, particles, device
+        self.fields = allocate(space, "Reference", n, device)
+        self.lists = NeighbourLists(space, weight, particles.h, particles.body, box, device)
+        self.K = wp.zeros(n, dtype=space.mat, device=device)
+        self.poor = wp.zeros(n, dtype=wp.int32, device=device)
+        self._largest = wp.zeros(1, dtype=space.real, device=device)
+
+    @property
+    def near(self) -> Any:
+        """Struct of the neighbour rows."""
+        return self.lists.rows
+
+    def refresh(self, state: Any) -> None:
+        """Make ``state`` the reference: x_k, F_k, V_k, neighbours, pair weights, corrections (M3)."""
+        n = len(state.x)
+        wp.launch(_make_adopt(self.space), n, [state, self.particles, self.fields], device=self.device)
+        self.lists.build(self.fields.x)
+        sums = [self.particles, self.fields, self.near, self.K]
+        wp.launch(make_pair_sums(self.weight, self.space), n, sums, device=self.device)
+        wp.launch(make_correct(self.space), n, [self.K, self.fields, self.poor], device=self.device)
+
+    def defect(self, out: wp.array) -> None:
+        """−e_a [m^(d−1)], (n,) of vec: the dual divergence of a unit stress, zero where the arrangement is regular.
+
+        On the initial configuration e_a is the surface vector s_a (M10).
+        """
+        arguments = [self.fields, self.near, self.fields.L, out]
+        wp.launch(make_divergence(self.space), len(out), arguments, device=self.device)
+
+    def distortion(self, F: wp.array) -> float:
+        """Largest stretch or shortening of any particle since the last refresh; reads the device."""
+        self._largest.zero_()
+        wp.launch(_make_distortion(self.space), len(F), [F, self.fields, self._largest], device=self.device)
+        return float(self._largest.numpy()[0])

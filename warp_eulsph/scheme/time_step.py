@@ -1,0 +1,106 @@
+"""Time on the device: the step from the wave speeds, its growth, and output times hit exactly."""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from ..fields import clock_structure
+from ..space import Space
+
+
+@dataclass(frozen=True)
+class TimeStep:
+    """Δt = CFL · min spacing/c, wave speeds c of the current state measured in the reference.
+
+    Args:
+        cfl: Courant number.
+        growth: largest ratio of successive steps.
+        fixed: a constant step [s] instead; steps before a target time are still shortened to hit it.
+    """
+
+    cfl: float = 0.4
+    growth: float = 1.1
+    fixed: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.cfl) and self.cfl > 0.0):
+            raise ValueError(f"cfl must be positive and finite, got {self.cfl}; 0.4 is the tested value")
+        if not self.growth > 1.0:
+            raise ValueError(f"growth must be greater than 1, got {self.growth}; 1.1 lets a step double in 8")
+        if self.fixed is not None and not (math.isfinite(self.fixed) and self.fixed > 0.0):
+            raise ValueError(f"fixed time step must be positive and finite, got {self.fixed} s")
+
+
+@functools.cache
+def _make_choose(space: Space) -> Any:
+    Clock = clock_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def choose(clock: Clock, cfl: wp.float64, growth: wp.float64, fixed: wp.float64):
+        dt = fixed
+        if fixed == wp.float64(0.0):
+            dt = cfl / wp.float64(clock.rate[0])
+            if clock.free_dt[0] > wp.float64(0.0):
+                dt = wp.min(dt, growth * clock.free_dt[0])
+        clock.free_dt[0] = dt
+        left = clock.target[0] - clock.t[0]
+        if dt >= left * (wp.float64(1.0) - wp.float64(1.0e-10)):
+            dt = wp.max(left, wp.float64(0.0))
+        elif dt > wp.float64(0.5) * left and fixed == wp.float64(0.0):
+            dt = wp.float64(0.5) * left  # two even steps instead of a long and a tiny one
+        clock.dt[0] = dt
+
+    return choose
+
+
+@functools.cache
+def _make_tick(space: Space) -> Any:
+    Clock = clock_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def tick(clock: Clock):
+        left = clock.target[0] - clock.t[0]
+        if clock.dt[0] >= left:
+            clock.t[0] = wp.max(clock.target[0], clock.t[0])
+        else:
+            clock.t[0] = clock.t[0] + clock.dt[0]
+
+    return tick
+
+
+class DeviceClock:
+    """The clock arrays and the launches that move them; a step at the target time has Δt = 0 and changes nothing."""
+
+    def __init__(self, space: Space, option: TimeStep, device: Any):
+        self.space, self.option, self.device = space, option, device
+        self.fields = clock_structure(space)()
+        for name in ("t", "dt", "free_dt", "target"):
+            setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
+        self.fields.rate = wp.zeros(1, dtype=space.real, device=device)
+
+    @property
+    def t(self) -> float:
+        """Time [s]; reads the device."""
+        return float(self.fields.t.numpy()[0])
+
+    @property
+    def dt(self) -> float:
+        """Last time step [s]; reads the device."""
+        return float(self.fields.dt.numpy()[0])
+
+    def aim(self, target: float) -> None:
+        """Set the time [s] that must be hit next."""
+        self.fields.target.fill_(target)
+
+    def choose(self) -> None:
+        """Δt for the step to come, from ``rate``."""
+        option = self.option
+        arguments = [self.fields, option.cfl, option.growth, option.fixed or 0.0]
+        wp.launch(_make_choose(self.space), 1, arguments, device=self.device)
+
+    def tick(self) -> None:
+        """t ← t + Δt, exactly the target when it is reached."""
+        wp.launch(_make_tick(self.space), 1, [self.fields], device=self.device)
