@@ -75,9 +75,11 @@ class Simulation:
         self.device = wp.get_device(device)
         n = len(X)
         counts = [len(body.x) for body in self.bodies]
-        volume = np.concatenate([np.broadcast_to(body.volume, c) for body, c in zip(self.bodies, counts)])
+        volume = np.concatenate([np.broadcast_to(body.volume, c) for body, c in zip(self.bodies, counts, strict=True)])
         spacing = volume ** (1.0 / space.dim)
-        density = np.concatenate([np.full(c, body.material.density) for body, c in zip(self.bodies, counts)])
+        density = np.concatenate(
+            [np.full(c, body.material.density) for body, c in zip(self.bodies, counts, strict=True)]
+        )
         self.particles = allocate(space, "Particles", n, self.device)
         self.particles.mass.assign(density * volume)
         self.particles.V0.assign(volume)
@@ -92,7 +94,9 @@ class Simulation:
         names = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}
         self.assembly = Assembly(space, self.device, X, self.particles, names)
         self.conditions = [boundary.bind(self.assembly) for boundary in boundaries]
-        flux = Flux(space, [(b.material, c) for b, c in zip(self.bodies, counts)], self.particles, self.device)
+        flux = Flux(
+            space, [(b.material, c) for b, c in zip(self.bodies, counts, strict=True)], self.particles, self.device
+        )
         box = tuple(periodic) if periodic is not None else (0.0,) * space.dim
         configuration = Configuration(space, weight, self.particles, box, self.device)
         self.clock = DeviceClock(space, time_step, self.device)

@@ -81,7 +81,7 @@ def make_correct(space: Space) -> Any:
         a = wp.tid()
         reference.L[a] = invert(K[a])
         _, values = eigen(K[a])
-        lacking = 0
+        lacking = int(0)
         for i in range(wp.static(dim)):
             if values[i] < real(CUTOFF):
                 lacking += 1

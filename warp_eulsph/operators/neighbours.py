@@ -62,8 +62,8 @@ def _make_search(space: Space, fill: bool) -> Any:
     ):
         a = wp.tid()
         reach = support * real(0.5) * (h[a] + h_max) * real(QUERY_MARGIN)
-        n = 0
-        row = 0
+        n = int(0)
+        row = int(0)
         if wp.static(fill):
             row = start[a]
         for ix in range(wp.static(images)):
@@ -71,7 +71,7 @@ def _make_search(space: Space, fill: bool) -> Any:
                 for iz in range(wp.static(shifts_z)):
                     p = padded[a]
                     shift = wp.vec3i(ix + first, iy + first, iz + first)
-                    inside = True
+                    inside = bool(True)
                     for i in range(wp.static(dim if space.periodic else 0)):
                         if shift[i] != 0:
                             p[i] = p[i] + box[i] * real(shift[i])
