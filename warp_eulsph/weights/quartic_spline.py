@@ -1,0 +1,46 @@
+"""Quartic spline of Schoenberg (1946)."""
+
+import functools
+import math
+from typing import Any
+
+import warp as wp
+
+from .base import Weight
+
+
+class QuarticSpline(Weight):
+    """Quartic B-spline, support 2.5 h."""
+
+    support = 2.5
+    sigma = (1.0 / 24.0, 96.0 / (1199.0 * math.pi), 1.0 / (20.0 * math.pi))
+
+    def profile(self, real: type) -> tuple[Any, Any]:
+        return _profile(real)
+
+
+@functools.cache
+def _profile(real: type) -> tuple[Any, Any]:
+    @wp.func
+    def fourth(x: real) -> real:
+        return x * x * x * x
+
+    @wp.func
+    def value(q: real) -> real:
+        w = fourth(real(2.5) - q)
+        if q < real(1.5):
+            w -= real(5.0) * fourth(real(1.5) - q)
+        if q < real(0.5):
+            w += real(10.0) * fourth(real(0.5) - q)
+        return w
+
+    @wp.func
+    def slope(q: real) -> real:
+        s = real(30.0) - real(24.0) * q * q
+        if q >= real(0.5):
+            a = real(2.5) - q
+            b = wp.max(real(1.5) - q, real(0.0))
+            s = real(4.0) * (a * a * a - real(5.0) * b * b * b) / q
+        return s
+
+    return value, slope

@@ -1,0 +1,46 @@
+"""Quintic spline of Schoenberg (1946)."""
+
+import functools
+import math
+from typing import Any
+
+import warp as wp
+
+from .base import Weight
+
+
+class QuinticSpline(Weight):
+    """Quintic B-spline, support 3 h."""
+
+    support = 3.0
+    sigma = (1.0 / 120.0, 7.0 / (478.0 * math.pi), 1.0 / (120.0 * math.pi))
+
+    def profile(self, real: type) -> tuple[Any, Any]:
+        return _profile(real)
+
+
+@functools.cache
+def _profile(real: type) -> tuple[Any, Any]:
+    @wp.func
+    def fifth(x: real) -> real:
+        return x * x * x * x * x
+
+    @wp.func
+    def value(q: real) -> real:
+        w = fifth(real(3.0) - q)
+        if q < real(2.0):
+            w -= real(6.0) * fifth(real(2.0) - q)
+        if q < real(1.0):
+            w += real(15.0) * fifth(real(1.0) - q)
+        return w
+
+    @wp.func
+    def slope(q: real) -> real:
+        s = real(120.0) - real(120.0) * q * q + real(50.0) * q * q * q
+        if q >= real(1.0):
+            a = (real(3.0) - q) * (real(3.0) - q)
+            b = wp.max(real(2.0) - q, real(0.0))
+            s = real(5.0) * (a * a - real(6.0) * b * b * b * b) / q
+        return s
+
+    return value, slope
