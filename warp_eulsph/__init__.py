@@ -12,10 +12,12 @@ Build bodies, state conditions, run::
 from .boundaries import Boundary, Fixed, Region, Velocity
 from .materials import Material, NeoHookean
 from .scheme.dissipation import Upwind
+from .scheme.health import UnstableError
 from .scheme.lax_wendroff import LaxWendroff
 from .scheme.pair_areas import PairAreas
 from .scheme.reference import Always, Every, Never, ReferencePolicy, WhenDistorted
 from .scheme.smoothing import LinearExact, Smoothing
+from .scheme.surface_vectors import SurfaceVectors
 from .scheme.time_step import TimeStep
 from .simulation import Body, Simulation
 from .space import Space
@@ -39,7 +41,9 @@ __all__ = [
     "Simulation",
     "Smoothing",
     "Space",
+    "SurfaceVectors",
     "TimeStep",
+    "UnstableError",
     "Upwind",
     "Velocity",
     "Weight",

@@ -100,7 +100,7 @@ def clock_structure(space: Space) -> Any:
     """Time on the device, so that a recorded step stays valid: arrays of one element.
 
     ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``target`` [s] time that
-    must be hit, ``rate`` [1/s] largest wave speed over spacing.
+    must be hit, ``rate`` [1/s] largest wave speed over spacing, ``bad`` index of the first unphysical particle.
     """
 
     @wp.struct
@@ -110,5 +110,6 @@ def clock_structure(space: Space) -> Any:
         free_dt: wp.array(dtype=wp.float64)
         target: wp.array(dtype=wp.float64)
         rate: wp.array(dtype=space.real)
+        bad: wp.array(dtype=wp.int32)
 
     return Clock

@@ -8,14 +8,19 @@ import numpy as np
 import warp as wp
 
 from .boundaries import Assembly, Boundary
+from .diagnostics import Diagnostics
 from .fields import allocate
 from .materials import Material
 from .scheme.flux import Flux
+from .scheme.health import UnstableError
 from .scheme.lax_wendroff import LaxWendroff, LaxWendroffStepper
 from .scheme.reference import Always, Configuration, ReferencePolicy
 from .scheme.time_step import DeviceClock, TimeStep
 from .space import Space
 from .weights import CubicSpline, Weight
+
+# A GPU runs this many steps between two looks at its clock; a step past the target or past a failure changes nothing.
+STEPS_BETWEEN_LOOKS = 8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,10 +30,13 @@ class Body:
     Args:
         x: initial positions [m], (n, dim).
         volume: initial volumes [m^dim], a number or (n,).
-        spacing: initial particle spacing [m], a number or (n,); by default volume^(1/dim).
         material: its law.
-        velocity: initial velocities [m/s], (dim,) or (n, dim).
+        spacing: initial particle spacing [m], a number or (n,); by default volume^(1/dim).
+        velocity: initial velocities [m/s], a number, (dim,) or (n, dim).
         name: for boundary conditions and output.
+
+    Raises:
+        ValueError: wrong shapes, non-finite values, volumes or spacings that are not positive.
     """
 
     x: np.ndarray
@@ -37,6 +45,36 @@ class Body:
     spacing: Any = None
     velocity: Any = 0.0
     name: str = "body"
+
+    def __post_init__(self) -> None:
+        x = np.array(self.x, dtype=float)
+        if x.ndim != 2 or x.shape[0] == 0 or x.shape[1] not in (1, 2, 3):
+            raise ValueError(f"body {self.name!r}: x must have shape (n, 1), (n, 2) or (n, 3), got {x.shape}")
+        object.__setattr__(self, "x", x)
+        self._field("x", x, x.shape)
+        object.__setattr__(self, "volume", self._field("volume", self.volume, (len(x),), positive=True))
+        spacing = self.volume ** (1.0 / x.shape[1]) if self.spacing is None else self.spacing
+        object.__setattr__(self, "spacing", self._field("spacing", spacing, (len(x),), positive=True))
+        object.__setattr__(self, "velocity", self._field("velocity", self.velocity, x.shape))
+
+    def _field(self, name: str, given: Any, shape: tuple[int, ...], positive: bool = False) -> np.ndarray:
+        values = np.asarray(given, dtype=float)
+        try:
+            values = np.broadcast_to(values, shape)
+        except ValueError:
+            raise ValueError(
+                f"body {self.name!r}: {name} must be a number or have shape {shape}, got {values.shape}"
+            ) from None
+        wrong = ~np.isfinite(values)
+        if positive:
+            wrong |= values <= 0.0
+        if wrong.any():
+            first = np.argwhere(wrong)[0]
+            raise ValueError(
+                f"body {self.name!r}: {name} must be {'positive and ' if positive else ''}finite, "
+                f"got {values[tuple(first)]} at particle {first[0]} ({wrong.sum()} such values)"
+            )
+        return values.copy()
 
 
 class Simulation:
@@ -53,6 +91,10 @@ class Simulation:
         periodic: lengths [m] of a periodic box with a corner at the origin, (dim,), 0 where open; None is open.
         dtype: ``wp.float64`` or ``wp.float32``.
         device: Warp device name; the default device if None.
+
+    Raises:
+        ValueError: bodies of different dimension, equal names, coincident particles, particles whose neighbours do not
+            span the space, a region that selects nothing, options out of range.
     """
 
     def __init__(
@@ -69,45 +111,87 @@ class Simulation:
         dtype: type = wp.float64,
         device: Any = None,
     ):
-        self.bodies = [bodies] if isinstance(bodies, Body) else list(bodies)
-        X = np.concatenate([np.asarray(body.x, dtype=float) for body in self.bodies])
-        self.space = space = Space(X.shape[1], dtype, periodic is not None)
+        self.bodies = _checked_bodies([bodies] if isinstance(bodies, Body) else list(bodies))
+        X = np.concatenate([body.x for body in self.bodies])
+        self.space = Space(X.shape[1], dtype, periodic is not None)
         self.device = wp.get_device(device)
-        n = len(X)
+        self.boundaries = tuple(boundaries)
+        if not (np.isfinite(dilation) and dilation > 0.0):
+            raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
+        box = _checked_box(periodic, self.space.dim)
         counts = [len(body.x) for body in self.bodies]
-        volume = np.concatenate([np.broadcast_to(body.volume, c) for body, c in zip(self.bodies, counts, strict=True)])
-        spacing = volume ** (1.0 / space.dim)
-        density = np.concatenate(
-            [np.full(c, body.material.density) for body, c in zip(self.bodies, counts, strict=True)]
-        )
-        self.particles = allocate(space, "Particles", n, self.device)
-        self.particles.mass.assign(density * volume)
-        self.particles.V0.assign(volume)
-        self.particles.h.assign(dilation * spacing)
-        self.particles.spacing.assign(spacing)
-        self.particles.body.assign(np.repeat(np.arange(len(counts)), counts))
-        U = allocate(space, "State", n, self.device)
-        U.x.assign(X)
-        U.v.assign(np.concatenate([np.broadcast_to(body.velocity, body.x.shape) for body in self.bodies]))
-        U.F.assign(np.broadcast_to(np.eye(space.dim), (n, space.dim, space.dim)))
         ends = np.cumsum([0, *counts])
-        names = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}
-        self.assembly = Assembly(space, self.device, X, self.particles, names)
-        self.conditions = [boundary.bind(self.assembly) for boundary in boundaries]
-        flux = Flux(
-            space, [(b.material, c) for b, c in zip(self.bodies, counts, strict=True)], self.particles, self.device
-        )
-        box = tuple(periodic) if periodic is not None else (0.0,) * space.dim
-        configuration = Configuration(space, weight, self.particles, box, self.device)
-        self.clock = DeviceClock(space, time_step, self.device)
+        self.ranges = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}
+        self.particles = self._particles(dilation)
+        assembly = Assembly(self.space, self.device, X, self.particles, self.ranges)
+        self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
+        materials = [(body.material, len(body.x)) for body in self.bodies]
+        flux = Flux(self.space, materials, self.particles, self.device)
+        configuration = Configuration(self.space, weight, self.particles, box, self.device)
+        self.clock = DeviceClock(self.space, time_step, self.device)
+        U = self._state(X)
         self.stepper = LaxWendroffStepper(
-            scheme, space, U, self.particles, flux, configuration, reference, self.clock, self.conditions
+            scheme, self.space, U, self.particles, flux, configuration, reference, self.clock, self.conditions
         )
+        self._check_neighbourhoods(X)
+        self.diagnostics = Diagnostics(self.space, self.particles, self.device)
+        self._output: Any = None
+
+    # what a run does
+
+    def run(self, until: float, *, every: float | None = None, output: Any = None) -> None:
+        """Step to the time ``until`` [s], which is hit exactly.
+
+        Args:
+            until: end time [s], not before the present time.
+            every: time between frames [s]; the first frame is the present state, the last the end.
+            output: directory for snapshots, or an object with ``write(simulation)``; asked once per frame.
+
+        Raises:
+            UnstableError: det F ≤ 0 or non-finite values; the last good frame stays on disk.
+        """
+        if not (np.isfinite(until) and until >= self.t):
+            raise ValueError(f"until must be finite and not before the present time {self.t} s, got {until}")
+        if output is None:
+            self._advance(until)
+            return
+        self._output = _writer(output)
+        self._output.write(self)
+        for _ in self.frames(_frame_times(self.t, until, every)):
+            self._output.write(self)
+
+    def frames(self, times: Sequence[float]) -> Iterator[float]:
+        """Step through increasing ``times`` [s], yielding each when it is reached exactly."""
+        for time in times:
+            self._advance(time)
+            yield time
+
+    def step(self, count: int = 1) -> None:
+        """Take ``count`` steps of the scheme's own length, aiming at no time."""
+        self.clock.aim(np.inf)
+        for _ in range(count):
+            self.stepper.step()
+        self._raise_if_bad()
+
+    def _advance(self, until: float) -> None:
+        self.clock.aim(until)
+        batch = STEPS_BETWEEN_LOOKS if self.device.is_cuda else 1
+        while self.t < until:
+            for _ in range(batch):
+                self.stepper.step()
+            self._raise_if_bad()
+
+    # what a user looks at
 
     @property
     def t(self) -> float:
         """Time [s]."""
         return self.clock.t
+
+    @property
+    def dt(self) -> float:
+        """Last time step [s]."""
+        return self.clock.dt
 
     @property
     def steps(self) -> int:
@@ -129,14 +213,139 @@ class Simulation:
         """Deformation gradients [-], a copy of shape (n, dim, dim)."""
         return self.stepper.U.F.numpy().copy()
 
-    def run(self, until: float) -> None:
-        """Step to the time ``until`` [s], which is hit exactly."""
-        self.clock.aim(until)
-        while self.clock.t < until:
-            self.stepper.step()
+    @property
+    def J(self) -> np.ndarray:
+        """Volume ratios det F [-], (n,)."""
+        return self.diagnostics.jacobians(self.stepper.U)
 
-    def frames(self, times: Sequence[float]) -> Iterator[float]:
-        """Step through ``times`` [s], yielding each when it is reached exactly."""
-        for time in times:
-            self.run(time)
-            yield time
+    def energy(self) -> dict[str, float]:
+        """Energies [J]: kinetic, stored, total, what each mechanism added since the start, and the residual."""
+        U, ledger = self.stepper.U, self.stepper.ledger
+        kinetic, stored = ledger.kinetic(U), ledger.stored(U)
+        accounts = ledger.accounts()
+        residual = kinetic + stored - ledger.start - sum(accounts.values())
+        return {"kinetic": kinetic, "stored": stored, "total": kinetic + stored, **accounts, "residual": residual}
+
+    def momentum(self) -> np.ndarray:
+        """Linear momentum [kg m/s], (dim,)."""
+        return self.diagnostics.momenta(self.stepper.U)[0][: self.space.dim]
+
+    def angular_momentum(self) -> np.ndarray:
+        """Angular momentum about the origin [kg m²/s]: (3,) in 3-D, (1,) about z in 2-D, (0,) in 1-D."""
+        about = self.diagnostics.momenta(self.stepper.U)[1]
+        return {1: about[:0], 2: about[2:], 3: about}[self.space.dim]
+
+    def reaction(self, boundary: Boundary) -> np.ndarray:
+        """Force [N] that a velocity condition exerted on its particles, mean over the last step, (dim,)."""
+        if boundary not in self.boundaries:
+            raise ValueError(f"reaction: {boundary!r} is not one of the simulation's {len(self.boundaries)} boundaries")
+        indices = self.conditions[self.boundaries.index(boundary)].indices
+        return self.stepper.forces.reaction.numpy()[indices].sum(axis=0)
+
+    # how it is built
+
+    def _particles(self, dilation: float) -> Any:
+        counts = [len(body.x) for body in self.bodies]
+        volume = np.concatenate([body.volume for body in self.bodies])
+        spacing = np.concatenate([body.spacing for body in self.bodies])
+        density = np.repeat([body.material.density for body in self.bodies], counts)
+        particles = allocate(self.space, "Particles", len(volume), self.device)
+        particles.mass.assign(density * volume)
+        particles.V0.assign(volume)
+        particles.h.assign(dilation * spacing)
+        particles.spacing.assign(spacing)
+        particles.body.assign(np.repeat(np.arange(len(counts)), counts))
+        return particles
+
+    def _state(self, X: np.ndarray) -> Any:
+        n, dim = X.shape
+        U = allocate(self.space, "State", n, self.device)
+        U.x.assign(X)
+        U.v.assign(np.concatenate([body.velocity for body in self.bodies]))
+        U.F.assign(np.broadcast_to(np.eye(dim), (n, dim, dim)))
+        return U
+
+    def _check_neighbourhoods(self, X: np.ndarray) -> None:
+        configuration = self.stepper.configuration
+        nearest = configuration.nearest()
+        close = np.flatnonzero(nearest < 1e-6 * self.particles.spacing.numpy())
+        if close.size:
+            raise ValueError(
+                f"particles of a body must not coincide, got {close.size} with a neighbour closer than 1e-6 spacings; "
+                f"the first is particle {close[0]} {self._where(close[0], X)}; remove duplicates"
+            )
+        poor = np.flatnonzero(configuration.poor.numpy())
+        if poor.size:
+            neighbours = np.diff(configuration.near.start.numpy())[poor[0]]
+            raise ValueError(
+                f"the neighbours of a particle must span all {self.space.dim} directions, {poor.size} particles lack "
+                f"some; the first is particle {poor[0]} {self._where(poor[0], X)} with {neighbours} neighbours within "
+                f"h = {self.particles.h.numpy()[poor[0]]:.6g} m times {configuration.weight.support}; "
+                "increase dilation, check spacing, or use at least 2 particles across each direction"
+            )
+
+    def _where(self, particle: int, x: np.ndarray) -> str:
+        name = next(name for name, indices in self.ranges.items() if particle in indices)
+        return f"of body {name!r} at x = {np.array2string(x[particle], precision=6)} m"
+
+    def _raise_if_bad(self) -> None:
+        particle = self.clock.bad
+        if particle is None:
+            return
+        x, v, F = self.x[particle], self.v[particle], self.F[particle]
+        if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
+            what = f"det F = {np.linalg.det(F):.4g}, must be positive"
+        else:
+            what = f"non-finite values, v = {v}, F = {F.tolist()}"
+        kept = "no snapshot was written"
+        if getattr(self._output, "last", None) is not None:
+            kept = f"the last good snapshot is {self._output.last}"
+        raise UnstableError(
+            f"unstable at t = {self.t:.8g} s, step {self.steps}: particle {particle} "
+            f"{self._where(particle, self.x)} has {what}; {kept}; try a smaller cfl, a finer resolution, a limiter, or a moving reference",
+            particle,
+            self.t,
+            self.steps,
+        )
+
+
+def _checked_bodies(bodies: list[Body]) -> list[Body]:
+    if not bodies:
+        raise ValueError("a simulation needs at least one body, got none")
+    names = [body.name for body in bodies]
+    if len(set(names)) < len(names):
+        raise ValueError(f"names of bodies must differ, got {names}; pass name=...")
+    dims = {body.name: body.x.shape[1] for body in bodies}
+    if len(set(dims.values())) > 1:
+        raise ValueError(f"bodies must have the same dimension, got {dims}")
+    return bodies
+
+
+def _checked_box(periodic: Sequence[float] | None, dim: int) -> tuple[float, ...]:
+    if periodic is None:
+        return (0.0,) * dim
+    box = tuple(float(length) for length in periodic)
+    if len(box) != dim or not all(np.isfinite(length) and length >= 0.0 for length in box):
+        raise ValueError(f"periodic must be {dim} lengths [m], 0 where the box is open, got {periodic}")
+    return box
+
+
+def _frame_times(start: float, until: float, every: float | None) -> list[float]:
+    if every is None:
+        return [until]
+    if not (np.isfinite(every) and every > 0.0):
+        raise ValueError(f"every must be a positive time [s], got {every}")
+    count = int(np.floor((until - start) / every * (1.0 + 1e-12)))
+    times = [start + every * k for k in range(1, count + 1)]
+    if not times or times[-1] < until - 1e-9 * every:
+        times.append(until)
+    times[-1] = min(times[-1], until)
+    return times
+
+
+def _writer(output: Any) -> Any:
+    if hasattr(output, "write"):
+        return output
+    from .output.snapshot import SnapshotWriter
+
+    return SnapshotWriter(output)

@@ -15,6 +15,7 @@ from ..operators.gradient import make_gradient
 from ..space import Space
 from .dissipation import Upwind, UpwindForces
 from .flux import Flux
+from .health import check
 from .ledger import Ledger
 from .pair_areas import PairAreas
 from .reference import Configuration, ReferencePolicy
@@ -145,8 +146,7 @@ class LaxWendroffStepper:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
         self._impose(U, 0.0)
         configuration.refresh(U)
-        configuration.defect(U.surface)
-        wp.map(wp.neg, U.surface, out=U.surface)
+        configuration.defect(self.half.surface, U.surface)  # s_a = e_a at the start (M10), when half.surface is 0
         self._after_refresh()
         self.ledger = Ledger(space, particles, flux, configuration, clock, device)
         self.ledger.open(U)
@@ -168,6 +168,7 @@ class LaxWendroffStepper:
         self._correct(U, half)  # M8: U^{n+1}, x^{n+1}
         self._impose(U, 1.0)
         self.flux.carry(U.F)  # fluids keep J only
+        check(self.space, U, self.clock.fields, self.device)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
         self.steps += 1

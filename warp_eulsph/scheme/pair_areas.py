@@ -45,20 +45,6 @@ class PairAreas:
 
 
 @functools.cache
-def _make_defect(space: Space) -> Any:
-    """Kernel: d_a = e_a − s_a from −e_a."""
-    vec = space.vec
-    State = structure(space, "State")
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def defect(minus_e: wp.array(dtype=vec), state: State):
-        a = wp.tid()
-        minus_e[a] = -minus_e[a] - state.surface[a]
-
-    return defect
-
-
-@functools.cache
 def _make_remove_mean(space: Space) -> Any:
     real, vec = space.real, space.vec
 
@@ -153,8 +139,7 @@ class ClosedPairs:
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Solve for the potentials ψ of the new reference, body by body free of a mean (M11)."""
         defect = self.solver.residual
-        configuration.defect(defect)
-        wp.launch(_make_defect(self.space), len(defect), [defect, state], device=self.device)
+        configuration.defect(state.surface, defect)
         for first, count in self.bodies:
             self._sum(defect[first : first + count], self._total)
             wp.launch(_make_remove_mean(self.space), count, [first, count, self._total, defect], device=self.device)

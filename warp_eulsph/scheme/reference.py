@@ -5,14 +5,15 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import warp as wp
 
-from ..fields import allocate, structure
+from ..fields import allocate, neighbour_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
 from ..operators.correction import make_correct, make_pair_sums
 from ..operators.divergence import make_divergence
 from ..operators.neighbours import NeighbourLists
-from ..space import Space
+from ..space import Space, difference
 from ..weights import Weight
 
 
@@ -115,6 +116,35 @@ def _make_distortion(space: Space) -> Any:
     return distortion
 
 
+@functools.cache
+def _make_nearest(space: Space) -> Any:
+    real = space.real
+    Reference, Neighbours, separation = structure(space, "Reference"), neighbour_structure(space), difference(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_nearest(reference: Reference, near: Neighbours, nearest: wp.array(dtype=real)):
+        a = wp.tid()
+        least = real(wp.inf)
+        for k in range(near.start[a], near.start[a + 1]):
+            least = wp.min(least, wp.length(separation(reference.x[near.index[k]], reference.x[a], near.box)))
+        nearest[a] = least
+
+    return find_nearest
+
+
+@functools.cache
+def _make_defect(space: Space) -> Any:
+    """Kernel: e_a − s_a from −e_a."""
+    vec = space.vec
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def defect(surface: wp.array(dtype=vec), out: wp.array(dtype=vec)):
+        a = wp.tid()
+        out[a] = -out[a] - surface[a]
+
+    return defect
+
+
 class Configuration:
     """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
 
@@ -147,13 +177,20 @@ class Configuration:
         wp.launch(make_pair_sums(self.weight, self.space), n, sums, device=self.device)
         wp.launch(make_correct(self.space), n, [self.K, self.fields, self.poor], device=self.device)
 
-    def defect(self, out: wp.array) -> None:
-        """−e_a [m^(d−1)], (n,) of vec: the dual divergence of a unit stress, zero where the arrangement is regular.
+    def defect(self, surface: wp.array, out: wp.array) -> None:
+        """``out`` ← e_a − s_a [m^(d−1)], (n,) of vec, for surface vectors s_a (M10).
 
-        On the initial configuration e_a is the surface vector s_a (M10).
+        e_a = Σ_b V_b G_a(x_b), the dual divergence (M5) of a unit stress: what a uniform stress would exert on a.
         """
         arguments = [self.fields, self.near, self.fields.L, out]
         wp.launch(make_divergence(self.space), len(out), arguments, device=self.device)
+        wp.launch(_make_defect(self.space), len(out), [surface, out], device=self.device)
+
+    def nearest(self) -> np.ndarray:
+        """Distance of each particle to its nearest neighbour [m], (n,), inf without one; reads the device."""
+        nearest = wp.zeros(len(self.poor), dtype=self.space.real, device=self.device)
+        wp.launch(_make_nearest(self.space), len(nearest), [self.fields, self.near, nearest], device=self.device)
+        return nearest.numpy()
 
     def distortion(self, F: wp.array) -> float:
         """Largest stretch or shortening of any particle since the last refresh; reads the device."""

@@ -9,6 +9,7 @@ import warp as wp
 
 from ..fields import clock_structure
 from ..space import Space
+from .health import WELL
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ def _make_choose(space: Space) -> Any:
             dt = cfl / wp.float64(clock.rate[0])
             if clock.free_dt[0] > wp.float64(0.0):
                 dt = wp.min(dt, growth * clock.free_dt[0])
+        if clock.bad[0] != WELL:
+            dt = wp.float64(0.0)  # the run has failed: time stands still until the host looks
         clock.free_dt[0] = dt
         left = clock.target[0] - clock.t[0]
         if dt >= left * (wp.float64(1.0) - wp.float64(1.0e-10)):
@@ -62,11 +65,11 @@ def _make_tick(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def tick(clock: Clock):
-        left = clock.target[0] - clock.t[0]
-        if clock.dt[0] >= left:
-            clock.t[0] = wp.max(clock.target[0], clock.t[0])
-        else:
-            clock.t[0] = clock.t[0] + clock.dt[0]
+        if clock.bad[0] == WELL:
+            if clock.dt[0] >= clock.target[0] - clock.t[0]:
+                clock.t[0] = wp.max(clock.target[0], clock.t[0])
+            else:
+                clock.t[0] = clock.t[0] + clock.dt[0]
 
     return tick
 
@@ -80,6 +83,7 @@ class DeviceClock:
         for name in ("t", "dt", "free_dt", "target"):
             setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
         self.fields.rate = wp.zeros(1, dtype=space.real, device=device)
+        self.fields.bad = wp.full(1, WELL, dtype=wp.int32, device=device)
 
     @property
     def t(self) -> float:
@@ -100,6 +104,12 @@ class DeviceClock:
         option = self.option
         arguments = [self.fields, option.cfl, option.growth, option.fixed or 0.0]
         wp.launch(_make_choose(self.space), 1, arguments, device=self.device)
+
+    @property
+    def bad(self) -> int | None:
+        """Index of the first unphysical particle, None while all are well; reads the device."""
+        first = int(self.fields.bad.numpy()[0])
+        return None if first == WELL else first
 
     def tick(self) -> None:
         """t ← t + Δt, exactly the target when it is reached."""

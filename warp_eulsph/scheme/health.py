@@ -1,0 +1,47 @@
+"""Is the state still physical? One flag on the device, set by the first bad particle."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..fields import clock_structure, structure
+from ..linalg import det
+from ..space import Space
+
+#: Value of ``clock.bad`` while every particle is well.
+WELL = 2**31 - 1
+
+
+class UnstableError(RuntimeError):
+    """A run met det F ≤ 0 or a non-finite value; the message names particle, position, time and remedies.
+
+    Attributes:
+        particle: index of the first bad particle.
+        time: time [s] at the end of the last good step.
+        step: number of steps taken, the bad one included.
+    """
+
+    def __init__(self, message: str, particle: int, time: float, step: int):
+        super().__init__(message)
+        self.particle, self.time, self.step = particle, time, step
+
+
+@functools.cache
+def _make_check(space: Space) -> Any:
+    real = space.real
+    State, Clock, determinant = structure(space, "State"), clock_structure(space), det(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def check(state: State, clock: Clock):
+        a = wp.tid()
+        finite = wp.isfinite(state.x[a]) and wp.isfinite(state.v[a]) and wp.isfinite(state.F[a])
+        if not finite or determinant(state.F[a]) <= real(0.0):
+            wp.atomic_min(clock.bad, 0, a)
+
+    return check
+
+
+def check(space: Space, state: Any, clock: Any, device: Any) -> None:
+    """Set ``clock.bad`` to the lowest index of a particle with det F ≤ 0 or a non-finite x, v or F."""
+    wp.launch(_make_check(space), len(state.x), [state, clock], device=device)
