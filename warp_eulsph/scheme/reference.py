@@ -12,7 +12,9 @@ from ..fields import allocate, neighbour_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
 from ..operators.correction import make_correct, make_pair_sums
 from ..operators.divergence import make_divergence
+from ..operators.interpolation import Interpolation
 from ..operators.neighbours import NeighbourLists
+from ..operators.values import Values
 from ..space import Space, difference
 from ..weights import Weight
 
@@ -162,6 +164,7 @@ class Configuration:
         self.K = wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
+        self._interpolations: dict[Values, Interpolation] = {}
 
     @property
     def near(self) -> Any:
@@ -176,6 +179,16 @@ class Configuration:
         sums = [self.particles, self.fields, self.near, self.K]
         wp.launch(make_pair_sums(self.weight, self.space), n, sums, device=self.device)
         wp.launch(make_correct(self.space), n, [self.K, self.fields, self.poor], device=self.device)
+        for interpolation in self._interpolations.values():
+            interpolation.refresh()
+
+    def interpolation(self, values: Values) -> Interpolation:
+        """N with these corrected values; made at the first call, refreshed with the reference from then on."""
+        if values not in self._interpolations:
+            made = Interpolation(values, self.space, self.weight, self.particles, self.fields, self.near, self.device)
+            made.refresh()
+            self._interpolations[values] = made
+        return self._interpolations[values]
 
     def defect(self, surface: wp.array, out: wp.array) -> None:
         """``out`` ← e_a − s_a [m^(d−1)], (n,) of vec, for surface vectors s_a (M10).

@@ -7,6 +7,7 @@ from typing import ClassVar
 import warp as wp
 
 from ..operators.smoothing import make_linear_exact
+from ..operators.values import Shepard, Values
 from ..space import Space
 from .reference import Configuration
 
@@ -44,3 +45,26 @@ class LinearExact(Smoothing):
         components = wp.types.type_size(f.dtype)
         arguments = [configuration.particles, configuration.fields, configuration.near, self.theta, f, gradient, out]
         wp.launch(make_linear_exact(space, components), len(f), arguments, device=f.device)
+
+
+@dataclass(frozen=True)
+class NeighbourAverage(Smoothing):
+    """The paper's smoothing (§4.2): the corrected average over the neighbours alone (M6).
+
+    Stable up to CFL 2 on periodic lattices; on bounded bodies it grows without strong dissipation (METHOD §3), so it is
+    there to reproduce the paper.
+
+    Args:
+        values: Shepard(), exact for constants, or Linear(), exact for linear fields too.
+    """
+
+    values: Values = Shepard()
+    needs_gradient = False
+    smooths_reference = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.values, Values):
+            raise ValueError(f"values must be Shepard() or Linear(), got {self.values!r}")
+
+    def apply(self, space: Space, configuration: Configuration, f: wp.array, gradient: wp.array, out: wp.array) -> None:
+        configuration.interpolation(self.values).average(f, out)
