@@ -1,0 +1,5 @@
+"""Shapes as particles."""
+
+from .lattice import box
+
+__all__ = ["box"]

@@ -1,0 +1,206 @@
+"""One frame, one immutable file: plain HDF5 that is a static VTKHDF PolyData too (ParaView, VTK, PyVista, h5py)."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..fields import PARTICLES, STATE
+from ..simulation import Simulation
+from .atomic import replace_file
+from .stress import cauchy_stress, padded
+
+
+class SnapshotField(NamedTuple):
+    """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and where it comes from."""
+
+    shape: Callable[[int], tuple[int, ...]]
+    unit: str
+    meaning: str
+    values: Callable[["_Frame"], np.ndarray]
+
+
+class _Frame:
+    """The present state on the host; what several fields need is computed once."""
+
+    def __init__(self, simulation: Simulation):
+        self.simulation = simulation
+        self.F = simulation.F
+        self.J = np.linalg.det(self.F)
+        self._stress: np.ndarray | None = None
+
+    @property
+    def stress(self) -> np.ndarray:
+        if self._stress is None:
+            self._stress = cauchy_stress(self.simulation)
+        return self._stress
+
+
+def _density(frame: _Frame) -> np.ndarray:
+    particles = frame.simulation.particles
+    return particles.mass.numpy() / (particles.V0.numpy() * frame.J)
+
+
+#: Every field that a snapshot can hold. Stress has nine components in any dimension: σ33 of plane strain counts.
+FIELDS = {
+    "velocity": SnapshotField(lambda d: (d,), STATE["v"].unit, STATE["v"].meaning, lambda f: f.simulation.v),
+    "deformation_gradient": SnapshotField(
+        lambda d: (d, d), STATE["F"].unit, STATE["F"].meaning + "; missing stretches are 1", lambda f: f.F
+    ),
+    "J": SnapshotField(lambda d: (), "-", "volume over initial volume, det F", lambda f: f.J),
+    "cauchy_stress": SnapshotField(lambda d: (3, 3), "Pa", "Cauchy stress", lambda f: f.stress),
+    "pressure": SnapshotField(
+        lambda d: (), "Pa", "pressure, minus a third of the trace of the stress", lambda f: -np.trace(f.stress.T) / 3.0
+    ),
+    "density": SnapshotField(lambda d: (), "kg/m^3", "density", _density),
+    "body": SnapshotField(
+        lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, lambda f: f.simulation.particles.body.numpy()
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A frame read back.
+
+    Attributes:
+        time: [s], float64 as the run had it.
+        step: steps taken before it.
+        x: positions [m], (n, dim).
+        fields: name -> values in their natural shape: (n,), (n, dim), (n, dim, dim); stress (n, 3, 3).
+        units: name -> SI unit.
+    """
+
+    time: float
+    step: int
+    x: np.ndarray
+    fields: dict[str, np.ndarray]
+    units: dict[str, str]
+
+
+def chosen_fields(names: Iterable[str] | None) -> list[str]:
+    """The names, checked; all fields if None.
+
+    Raises:
+        ValueError: a name that is not in ``FIELDS``.
+    """
+    wanted = list(FIELDS) if names is None else list(names)
+    unknown = [name for name in wanted if name not in FIELDS]
+    if unknown:
+        raise ValueError(f"snapshot fields must be among {list(FIELDS)}, got {unknown}")
+    return wanted
+
+
+def write_snapshot(
+    path: str | PathLike, simulation: Simulation, fields: Iterable[str] | None = None, *, dtype: Any = np.float32
+) -> None:
+    """Write the present state to ``path``, which appears whole or not at all.
+
+    Args:
+        path: file to make or replace, by custom ``*.vtkhdf``.
+        simulation: its state.
+        fields: names of ``FIELDS``; all if None. Positions are always there.
+        dtype: ``np.float32`` or ``np.float64`` for positions and real fields; time is float64 always.
+
+    Raises:
+        ValueError: unknown field or dtype.
+        OSError: nothing was written; what ``path`` held before is still there.
+    """
+    if np.dtype(dtype) not in (np.dtype(np.float32), np.dtype(np.float64)):
+        raise ValueError(f"dtype must be numpy.float32 or numpy.float64, got {dtype}")
+    names = chosen_fields(fields)
+    frame = _Frame(simulation)
+    values = {name: FIELDS[name].values(frame) for name in names}
+    replace_file(Path(path), lambda temporary: _write(temporary, simulation, values, np.dtype(dtype)))
+
+
+def _write(path: Path, simulation: Simulation, values: dict[str, np.ndarray], dtype: np.dtype) -> None:
+    import h5py
+
+    x, dim = simulation.x, simulation.space.dim
+    n = len(x)
+    # VTK's HDF5 is older than h5py's: newer file formats than 1.10's do not open there.
+    with h5py.File(path, "w", libver=("earliest", "v110")) as file:
+        file.attrs["time"], file.attrs["time_unit"] = np.float64(simulation.t), "s"
+        file.attrs["step"], file.attrs["dimension"] = np.int64(simulation.steps), np.int64(dim)
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array([2, 2], dtype=np.int64)
+        root.attrs["Type"] = np.bytes_("PolyData")  # fixed-length ASCII; VTK reads no other kind
+        root["NumberOfPoints"] = np.array([n], dtype=np.int64)
+        points = np.zeros((n, 3), dtype=dtype)
+        points[:, :dim] = x
+        root["Points"] = points
+        root["Points"].attrs["unit"] = STATE["x"].unit
+        _write_cells(root, n)
+        data = root.create_group("PointData")
+        for name, value in values.items():
+            _write_field(data, name, value, dim, dtype)
+        _mark_active(data, values)
+        root["FieldData/TimeValue"] = np.array([simulation.t])  # the name VTK gives to a data set's time
+        root["FieldData/Step"] = np.array([simulation.steps], dtype=np.int64)
+
+
+def _write_cells(root: Any, n: int) -> None:
+    """One vertex cell per particle; the other kinds of cells must be there and are empty."""
+    for kind, cells in (("Vertices", n), ("Lines", 0), ("Polygons", 0), ("Strips", 0)):
+        group = root.create_group(kind)
+        group["NumberOfCells"] = np.array([cells], dtype=np.int64)
+        group["NumberOfConnectivityIds"] = np.array([cells], dtype=np.int64)
+        for name, size in (("Connectivity", cells), ("Offsets", cells + 1)):
+            ids = np.arange(size, dtype=np.int64)
+            group.create_dataset(name, data=ids, compression="gzip" if size > 1 else None)
+
+
+def _write_field(data: Any, name: str, value: np.ndarray, dim: int, dtype: np.dtype) -> None:
+    field = FIELDS[name]
+    shape = field.shape(dim)
+    stored = value if value.dtype.kind == "i" else value.astype(dtype)
+    if len(shape) == 1:
+        stored = np.pad(stored, ((0, 0), (0, 3 - dim)))
+    elif len(shape) == 2:
+        stored = padded(stored, 1.0).reshape(len(stored), 9)  # row by row; VTK reads no (n, 3, 3)
+    dataset = data.create_dataset(name, data=stored)
+    dataset.attrs["unit"], dataset.attrs["meaning"] = field.unit, field.meaning
+    dataset.attrs["shape"] = np.array(shape, dtype=np.int64)
+
+
+def _mark_active(data: Any, values: dict[str, np.ndarray]) -> None:
+    """Mark the first vector and the first tensor field; VTK's reader drops all but the last of two so marked."""
+    for rank, attribute in ((2, "Vectors"), (3, "Tensors")):
+        first = next((name for name, value in values.items() if value.ndim == rank), None)
+        if first is not None:
+            data[first].attrs["Attribute"] = np.bytes_(attribute)
+
+
+def read_snapshot(path: str | PathLike) -> Snapshot:
+    """Read a file of ``write_snapshot``.
+
+    Raises:
+        OSError: no such file, or not HDF5.
+        ValueError: HDF5, but not such a file.
+    """
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        missing = [key for key in ("time", "step", "dimension") if key not in file.attrs]
+        if missing or "VTKHDF/PointData" not in file:
+            raise ValueError(f"{path} is not a snapshot of this package: missing {missing or 'VTKHDF/PointData'}")
+        dim = int(file.attrs["dimension"])
+        fields, units = {}, {}
+        for name, dataset in file["VTKHDF/PointData"].items():
+            fields[name] = _natural(dataset[()], tuple(int(i) for i in dataset.attrs["shape"]))
+            units[name] = str(dataset.attrs["unit"])
+        x = file["VTKHDF/Points"][:, :dim]
+        return Snapshot(float(file.attrs["time"]), int(file.attrs["step"]), x, fields, units)
+
+
+def _natural(stored: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Stored rows without the padding."""
+    if len(shape) == 1:
+        return stored[:, : shape[0]]
+    if len(shape) == 2:
+        return stored.reshape(-1, 3, 3)[:, : shape[0], : shape[1]]
+    return stored
