@@ -11,7 +11,7 @@ from .boundaries import Assembly, Boundary
 from .diagnostics import Diagnostics
 from .fields import allocate
 from .materials import Material
-from .scheme.flux import Flux
+from .scheme.flux import Flux, check_reference
 from .scheme.health import UnstableError
 from .scheme.lax_wendroff import LaxWendroff, LaxWendroffStepper
 from .scheme.reference import Always, Configuration, ReferencePolicy
@@ -116,6 +116,7 @@ class Simulation:
         self.space = Space(X.shape[1], dtype, periodic is not None)
         self.device = wp.get_device(device)
         self.boundaries = tuple(boundaries)
+        check_reference([body.material for body in self.bodies], reference)
         if not (np.isfinite(dilation) and dilation > 0.0):
             raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
         box = _checked_box(periodic, self.space.dim)
@@ -302,7 +303,8 @@ class Simulation:
             kept = f"the last good snapshot is {self._output.last}"
         raise UnstableError(
             f"unstable at t = {self.t:.8g} s, step {self.steps}: particle {particle} "
-            f"{self._where(particle, self.x)} has {what}; {kept}; try a smaller cfl, a finer resolution, a limiter, or a moving reference",
+            f"{self._where(particle, self.x)} has "
+            f"{what}; {kept}; try a smaller cfl, a finer resolution, a limiter, or a moving reference",
             particle,
             self.t,
             self.steps,
@@ -346,6 +348,6 @@ def _frame_times(start: float, until: float, every: float | None) -> list[float]
 def _writer(output: Any) -> Any:
     if hasattr(output, "write"):
         return output
-    from .output.snapshot import SnapshotWriter
+    from .output import SnapshotWriter
 
     return SnapshotWriter(output)

@@ -1,6 +1,24 @@
 """Materials, one law per file."""
 
+from .bar import Bar
 from .base import Law, Material
+from .linear_elastic import LinearElastic
+from .mooney_rivlin import MooneyRivlin
+from .nearly_incompressible import NearlyIncompressible
 from .neo_hookean import NeoHookean
+from .neo_hookean_log import NeoHookeanLog
+from .saint_venant_kirchhoff import SaintVenantKirchhoff
+from .tait_liquid import TaitLiquid
 
-__all__ = ["Law", "Material", "NeoHookean"]
+__all__ = [
+    "Bar",
+    "Law",
+    "LinearElastic",
+    "Material",
+    "MooneyRivlin",
+    "NearlyIncompressible",
+    "NeoHookean",
+    "NeoHookeanLog",
+    "SaintVenantKirchhoff",
+    "TaitLiquid",
+]

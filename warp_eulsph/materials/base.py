@@ -1,9 +1,12 @@
 """What a material declares."""
 
+import functools
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
+
+import warp as wp
 
 from ..space import Space
 
@@ -15,10 +18,16 @@ class Law(NamedTuple):
         Constants: ``wp.struct`` of scalars that the functions take.
         stress: (F, constants) -> P, first Piola–Kirchhoff stress [Pa].
         energy: (F, constants) -> Ψ, stored energy per initial volume [J/m^d].
-        wave_moduli: (F, constants) -> (M, μ): ρ0 c_p² and ρ0 c_s² [Pa] of the fastest waves, c in the current
-            configuration.
-        carry: (F, constants) -> F, what the material keeps of an updated F; None keeps all of it. A fluid keeps
-            det(F)^(1/d) I: its F would grow without bound in shear (METHOD: materials in a moving reference).
+        wave_moduli: (F, constants) -> (M, μ) [Pa]. M bounds ρ0 c² of all waves in all directions, c in the current
+            configuration; μ bounds ρ0 c² of the shear waves along the principal directions. Both are exact at F = I.
+        carry: what the material keeps of an F after a full step; None keeps all of it. (F, constants) -> F, or with a
+            history (F, history, constants) -> (F, history). A fluid keeps det(F)^(1/d) I, because its F would grow
+            without bound in shear; a plastic solid keeps its elastic part. Carrying twice must equal carrying once,
+            because a step of length zero carries too.
+        history: reals per particle that ``carry`` updates, zero at the start (a hardening variable, a largest stretch).
+
+    The moduli are second derivatives of Ψ along F → (I + ε m⊗n) F, n the direction of the wave and m its
+    polarisation: ρ0 c² m = Q(n) m with m·Q m = d²Ψ/dε² at ε = 0.
     """
 
     Constants: Any
@@ -26,6 +35,19 @@ class Law(NamedTuple):
     energy: Any
     wave_moduli: Any
     carry: Any = None
+    history: int = 0
+
+
+@functools.cache
+def largest_eigenvalue(real: type) -> Any:
+    """``wp.func`` largest eigenvalue of [[A, B], [B, C]]; it grows with A, C and |B|, so bounds of them bound it."""
+
+    @wp.func
+    def largest_eigenvalue(A: real, B: real, C: real) -> real:
+        half = real(0.5) * (A - C)
+        return real(0.5) * (A + C) + wp.sqrt(half * half + B * B)
+
+    return largest_eigenvalue
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +66,8 @@ class Material(ABC):
 
     #: The carried F is not the total deformation gradient, so the reference must be refreshed every step.
     needs_moving_reference: ClassVar[bool] = False
+    #: P is linear in F − I: for small strains and rotations only, because a rotation then causes stress.
+    linear: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         positive("density", self.density, "kg/m^3")
@@ -60,7 +84,7 @@ class Material(ABC):
 def positive(name: str, value: float, unit: str) -> None:
     """Raise unless ``value`` is a finite positive number."""
     if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} must be positive and finite, got {value} {unit}")
+        raise ValueError(f"{name} must be positive and finite, got {value}; give it in {unit}")
 
 
 def lame_constants(young: float, poisson: float) -> tuple[float, float]:

@@ -2,17 +2,18 @@
 
 import functools
 from dataclasses import dataclass
+from typing import Any
 
 import warp as wp
 
 from ..linalg import cofactor, det, symmetric_bounds
 from ..space import Space
-from .base import Law, Material, lame_constants
+from .base import Law, Material, lame_constants, largest_eigenvalue
 
 
 @dataclass(frozen=True, kw_only=True)
 class NeoHookean(Material):
-    """Ψ = μ/2 (J^(−2/3) F:F − 3) + κ/2 (J − 1)², Bonet & Wood (2008); BENCHMARKS' NHiso.
+    """Ψ = μ/2 (J^(−2/3) F:F − 3) + κ/2 (J − 1)², Bonet & Wood (2008).
 
     Args:
         density: initial density [kg/m³].
@@ -37,8 +38,35 @@ class NeoHookean(Material):
 
 @functools.cache
 def _law(space: Space) -> Law:
+    real = space.real
+
+    @wp.func
+    def volumetric_energy(J: real) -> real:
+        return real(0.5) * (J - real(1.0)) * (J - real(1.0))
+
+    @wp.func
+    def pressure_slope(J: real) -> real:
+        return J - real(1.0)
+
+    @wp.func
+    def volumetric_modulus(J: real) -> real:
+        return J * J
+
+    return isochoric_neo_hookean(space, volumetric_energy, pressure_slope, volumetric_modulus)
+
+
+def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: Any, volumetric_modulus: Any) -> Law:
+    """Law of Ψ = μ/2 (J^(−2/3) F:F − 3) + κ U(J).
+
+    Args:
+        space: dimension and precision.
+        volumetric_energy: ``wp.func`` J -> U.
+        pressure_slope: ``wp.func`` J -> U'.
+        volumetric_modulus: ``wp.func`` J -> J² U''.
+    """
     real, mat, pair = space.real, space.mat, space.row(2)
     determinant, cof, eigen_bounds = det(space), cofactor(space), symmetric_bounds(space)
+    coupled = largest_eigenvalue(real)
     missing = float(3 - space.dim)  # stretches that are held at one
 
     @wp.struct
@@ -51,22 +79,27 @@ def _law(space: Space) -> Law:
         J = determinant(F)
         isochoric = wp.pow(J, real(-2.0) / real(3.0))
         F_F = wp.ddot(F, F) + real(missing)
-        return F * (c.mu * isochoric) + cof(F) * (c.kappa * (J - real(1.0)) - c.mu / real(3.0) * isochoric / J * F_F)
+        return F * (c.mu * isochoric) + cof(F) * (c.kappa * pressure_slope(J) - c.mu / real(3.0) * isochoric / J * F_F)
 
     @wp.func
     def energy(F: mat, c: Constants) -> real:
         J = determinant(F)
         F_F = wp.ddot(F, F) + real(missing)
         shape = real(0.5) * c.mu * (wp.pow(J, real(-2.0) / real(3.0)) * F_F - real(3.0))
-        return shape + real(0.5) * c.kappa * (J - real(1.0)) * (J - real(1.0))
+        return shape + c.kappa * volumetric_energy(J)
 
     @wp.func
     def wave_moduli(F: mat, c: Constants) -> pair:
+        # m·Q m = μ J^(−2/3) [5/9 s² tr b − 4/3 s m·b n + n·b n] + κ J² U'' s², s = m·n; in the plane of n and a
+        # perpendicular p a 2×2 matrix whose entries are bounded one by one, |p·b n| ≤ (b_max − b_min)/2.
         J = determinant(F)
-        b = wp.pow(J, real(-2.0) / real(3.0)) * (F @ wp.transpose(F))
-        trace = wp.trace(b) + wp.pow(J, real(-2.0) / real(3.0)) * real(missing)
+        isochoric = wp.pow(J, real(-2.0) / real(3.0))
+        b = isochoric * (F @ wp.transpose(F))
+        trace = wp.trace(b) + isochoric * real(missing)
         b_range = eigen_bounds(b)
-        longitudinal = c.mu * (real(5.0) / real(9.0) * trace - b_range[0] / real(3.0)) + c.kappa * J * J
-        return pair(longitudinal, c.mu * b_range[1])
+        along = c.mu * (real(5.0) / real(9.0) * trace - b_range[0] / real(3.0)) + c.kappa * volumetric_modulus(J)
+        across = c.mu * b_range[1]
+        mixed = c.mu / real(3.0) * (b_range[1] - b_range[0])
+        return pair(coupled(along, mixed, across), across)
 
     return Law(Constants, stress, energy, wave_moduli)

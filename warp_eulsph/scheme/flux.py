@@ -1,6 +1,7 @@
 """The flux of momentum: stress in the reference, body by body (M1), and the wave speeds there."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import warp as wp
@@ -9,6 +10,7 @@ from ..fields import allocate, clock_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
 from ..materials import Law, Material
 from ..space import Space
+from .reference import Always, Every, ReferencePolicy
 
 
 @functools.cache
@@ -85,14 +87,28 @@ def _make_energy(space: Space, law: Law) -> Any:
 
 @functools.cache
 def _make_carry(space: Space, law: Law) -> Any:
-    mat, Constants, carry_F = space.mat, law.Constants, law.carry
+    mat, Constants, kept = space.mat, law.Constants, law.carry
 
     @wp.kernel(module="unique", enable_backward=False)
     def carry(first: int, F: wp.array(dtype=mat), c: Constants):
         a = first + wp.tid()
-        F[a] = carry_F(F[a], c)
+        F[a] = kept(F[a], c)
 
     return carry
+
+
+@functools.cache
+def _make_carry_history(space: Space, law: Law) -> Any:
+    mat, row, Constants, kept = space.mat, space.row(law.history), law.Constants, law.carry
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def carry_history(first: int, F: wp.array(dtype=mat), history: wp.array(dtype=row), c: Constants):
+        i = wp.tid()
+        F_a, history_a = kept(F[first + i], history[i], c)
+        F[first + i] = F_a
+        history[i] = history_a
+
+    return carry_history
 
 
 class _Part(NamedTuple):
@@ -100,6 +116,21 @@ class _Part(NamedTuple):
     size: int
     law: Law
     constants: Any
+    history: wp.array | None
+
+
+def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> None:
+    """Raise unless the reference moves every step where a material needs that.
+
+    Raises:
+        ValueError: a material with ``needs_moving_reference`` and a policy other than Always().
+    """
+    for material in materials:
+        if material.needs_moving_reference and policy not in (Always(), Every(1)):
+            raise ValueError(
+                f"reference must be Always() for {type(material).__name__}, whose F is not counted from the initial "
+                f"configuration, got {policy}"
+            )
 
 
 class Flux:
@@ -107,6 +138,9 @@ class Flux:
 
     Args:
         bodies: (material, number of particles) in the order of the particle arrays.
+
+    Attributes:
+        histories: what the material of each body remembers, (particles of the body,) of ``Law.history`` reals, or None.
     """
 
     def __init__(self, space: Space, bodies: list[tuple[Material, int]], particles: Any, device: Any):
@@ -118,9 +152,11 @@ class Flux:
             constants = law.Constants()
             for name, value in material.constants().items():
                 setattr(constants, name, value)
-            self.parts.append(_Part(first, count, law, constants))
+            history = wp.zeros(count, dtype=space.row(law.history), device=device) if law.history else None
+            self.parts.append(_Part(first, count, law, constants, history))
             first += count
         self.fields = allocate(space, "Flux", first, device)
+        self.histories = [part.history for part in self.parts]
 
     def compute(self, F: wp.array, reference: Any) -> None:
         """Q and Π = Q L of the deformation gradients ``F`` (M1, M5)."""
@@ -142,8 +178,13 @@ class Flux:
             wp.launch(_make_energy(self.space, part.law), part.size, arguments, device=self.device)
 
     def carry(self, F: wp.array) -> None:
-        """Reduce updated F to what each material carries, in place."""
+        """Reduce updated F to what each material carries, in place, and update the histories."""
         for part in self.parts:
-            if part.law.carry is not None:
-                arguments = [part.first, F, part.constants]
-                wp.launch(_make_carry(self.space, part.law), part.size, arguments, device=self.device)
+            if part.law.carry is None:
+                continue
+            if part.history is None:
+                kernel, arguments = _make_carry(self.space, part.law), [part.first, F, part.constants]
+            else:
+                kernel = _make_carry_history(self.space, part.law)
+                arguments = [part.first, F, part.history, part.constants]
+            wp.launch(kernel, part.size, arguments, device=self.device)
