@@ -3,6 +3,7 @@
 import functools
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ..fields import neighbour_structure, structure
@@ -59,11 +60,13 @@ def safe_ratio(space: Space) -> Any:
 @functools.cache
 def _make_advance(space: Space, start: bool) -> Any:
     """Kernel: x and residual along the search direction (or the first residual), preconditioned residual."""
-    real, vec = space.real, space.vec
+    real, vec, dim = space.real, space.vec, space.dim
+    roundoff = float(np.finfo(space.numpy).eps) ** 2
     ratio = safe_ratio(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def advance(
+        first: wp.array(dtype=vec),
         rz: wp.array(dtype=vec),
         pAp: wp.array(dtype=vec),
         diagonal: wp.array(dtype=real),
@@ -79,6 +82,10 @@ def _make_advance(space: Space, start: bool) -> Any:
             r[a] = r[a] - Ap[a]
         else:
             alpha = ratio(rz[0], pAp[0])
+            for i in range(wp.static(dim)):
+                # Below round-off the directions decay to the constants, on which the Laplacian is singular.
+                if rz[0][i] <= real(roundoff) * first[0][i]:
+                    alpha[i] = real(0.0)
             x[a] = x[a] + wp.cw_mul(alpha, p[a])
             r[a] = r[a] - wp.cw_mul(alpha, Ap[a])
         z_a = vec()
@@ -119,14 +126,15 @@ class LaplacianSolver:
         self.psi, self.residual = vector(n), vector(n)
         self._p, self._Ap, self._z, self._product = vector(n), vector(n), vector(n), vector(n)
         self._diagonal = wp.zeros(n, dtype=space.real, device=device)
-        self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1)
+        self._first, self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1), vector(1)
         self._sum = Sum(space.vec, device)
 
     def solve(self, reference: Any, near: Any, iterations: int) -> None:
         """Improve ``psi`` for the right-hand side in ``residual``, which becomes the residual."""
         self._apply(reference, near, self.psi)
         self._advance(start=True)
-        self._sum(self._product, self._rz)
+        self._sum(self._product, self._first)
+        wp.copy(self._rz, self._first)
         for _ in range(iterations):
             self._apply(reference, near, self._p)
             self._sum(self._product, self._pAp)
@@ -142,6 +150,7 @@ class LaplacianSolver:
 
     def _advance(self, start: bool) -> None:
         arguments = [
+            self._first,
             self._rz,
             self._pAp,
             self._diagonal,
