@@ -1,6 +1,26 @@
 """Boundary conditions, one per file."""
 
 from .base import Assembly, Bound, Boundary, Region
+from .body_force import BodyForce
+from .mirror import FreeEnd, MirrorGhosts, Wall, mirror
+from .pressure import Pressure
+from .roller import Roller
+from .traction import Traction
 from .velocity import Fixed, Velocity
 
-__all__ = ["Assembly", "Bound", "Boundary", "Fixed", "Region", "Velocity"]
+__all__ = [
+    "Assembly",
+    "BodyForce",
+    "Bound",
+    "Boundary",
+    "Fixed",
+    "FreeEnd",
+    "MirrorGhosts",
+    "Pressure",
+    "Region",
+    "Roller",
+    "Traction",
+    "Velocity",
+    "Wall",
+    "mirror",
+]

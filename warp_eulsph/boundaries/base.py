@@ -96,8 +96,23 @@ class Bound:
 
     indices: np.ndarray
 
+    def start(self, state: Any) -> None:
+        """Prepare from the initial state, surface vectors included; called once."""
+
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
-        """Change velocities ``state.v`` to their values at time t + fraction · Δt."""
+        """Change velocities ``state.v`` (of ghosts also ``F`` and ``x``) to their values at time t + fraction · Δt."""
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         """Add forces [N] at time t + fraction · Δt to ``external``."""
+
+
+def unit_vector(given: Sequence[float], dim: int, who: str) -> np.ndarray:
+    """``given`` at length one, (dim,).
+
+    Raises:
+        ValueError: wrong shape, zero or not finite.
+    """
+    vector = np.asarray(given, dtype=float)
+    if vector.shape != (dim,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0.0:
+        raise ValueError(f"{who}: normal must be ({dim},) finite numbers, not all zero, got {given}")
+    return vector / np.linalg.norm(vector)

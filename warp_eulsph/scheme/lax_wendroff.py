@@ -147,6 +147,8 @@ class LaxWendroffStepper:
         self._impose(U, 0.0)
         configuration.refresh(U)
         configuration.defect(self.half.surface, U.surface)  # s_a = e_a at the start (M10), when half.surface is 0
+        for condition in conditions:
+            condition.start(U)
         self._after_refresh()
         self.ledger = Ledger(space, particles, flux, configuration, clock, device)
         self.ledger.open(U)

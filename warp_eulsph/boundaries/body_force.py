@@ -1,0 +1,62 @@
+"""Body forces: gravity, centrifugal or manufactured ones."""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from ..space import Space
+from .base import Assembly, Bound, Boundary, Region
+from .value import Value
+
+
+@dataclass(frozen=True, eq=False)
+class BodyForce(Boundary):
+    """Force per mass on a region, m_a b on each particle; gravity is ``BodyForce((0.0, 0.0, -9.81))``.
+
+    Args:
+        value: b [m/s²]; constant, array or function of (x, t) (see ``Value``).
+        region: particles (see ``Region``); None takes all of the body.
+        body: name of the body, any by default.
+    """
+
+    value: Any
+    region: Region | None = None
+    body: str | None = None
+
+    def bind(self, assembly: Assembly) -> "BoundBodyForce":
+        return BoundBodyForce(self, assembly)
+
+
+@functools.cache
+def _make_load(space: Space) -> Any:
+    real, vec = space.real, space.vec
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def load(
+        indices: wp.array(dtype=wp.int32),
+        values: wp.array(dtype=vec),
+        mass: wp.array(dtype=real),
+        external: wp.array(dtype=vec),
+    ):
+        k = wp.tid()
+        a = indices[k]
+        external[a] = external[a] + values[k] * mass[a]
+
+    return load
+
+
+class BoundBodyForce(Bound):
+    """Adds the weight of the particles."""
+
+    def __init__(self, condition: BodyForce, assembly: Assembly):
+        who = type(condition).__name__
+        self.space, self.device, self.mass = assembly.space, assembly.device, assembly.particles.mass
+        self.indices = assembly.select(condition.region, condition.body, who)
+        self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
+
+    def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
+        values = self.values.at(state.x, clock, fraction)
+        arguments = [self.values.indices, values, self.mass, external]
+        wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)

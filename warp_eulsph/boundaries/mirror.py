@@ -1,0 +1,161 @@
+"""Mirror ghosts: particles behind a plane that copy those in front of it, so that the plane has no one-sided sums."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from ..fields import structure
+from ..space import Space
+from .base import Assembly, Bound, Boundary, unit_vector
+
+
+@dataclass(frozen=True)
+class Image:
+    """How a ghost copies its source; ``Wall`` or ``FreeEnd``."""
+
+    free: ClassVar[bool]
+
+
+@dataclass(frozen=True)
+class Wall(Image):
+    """Symmetry plane, frictionless wall, or fixed end in 1-D: v' = R v, F' = R F R with R = I − 2 n⊗n."""
+
+    free = False
+
+
+@dataclass(frozen=True)
+class FreeEnd(Image):
+    """Free end of a linear bar, in 1-D: v' = v and F' = 2 − F, which turns the stress round."""
+
+    free = True
+
+
+@dataclass(frozen=True, eq=False)
+class MirrorGhosts(Boundary):
+    """Overwrites the ghosts that ``mirror`` made; list it after the conditions on its sources.
+
+    Args:
+        body: name of the body.
+        sources: particles of the body that are copied, (k,).
+        ghosts: particles of the body that copy them, (k,).
+        point: a point of the plane [m], (dim,).
+        normal: unit normal of the plane, (dim,).
+        image: Wall() or FreeEnd().
+    """
+
+    body: str
+    sources: np.ndarray
+    ghosts: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    image: Image
+
+    def bind(self, assembly: Assembly) -> "BoundMirrorGhosts":
+        return BoundMirrorGhosts(self, assembly)
+
+
+def mirror(
+    body: Any, *, point: Sequence[float], normal: Sequence[float], depth: float, image: Image = Wall()
+) -> tuple[Any, MirrorGhosts]:
+    """The body with ghosts behind a plane, and the condition that moves them.
+
+    Ghosts are ordinary particles. Those next to the plane need all of their own neighbours, so take ``depth`` = two
+    support radii = 2 · weight.support · dilation · spacing. Two planes: mirror the result again; ghosts of ghosts fill
+    the corner.
+
+    Args:
+        body: a ``Body`` in front of the plane.
+        point: a point of the plane [m], (dim,).
+        normal: normal of the plane, pointing out of the body, (dim,).
+        depth: distance from the plane within which particles get a ghost [m].
+        image: Wall(), or FreeEnd() for a linear law in 1-D.
+
+    Raises:
+        ValueError: particles on or behind the plane, none within ``depth``, or FreeEnd where it does not hold.
+    """
+    dim = body.x.shape[1]
+    n, p = unit_vector(normal, dim, "mirror"), np.asarray(point, dtype=float)
+    if p.shape != (dim,) or not np.isfinite(p).all():
+        raise ValueError(f"mirror: point must be ({dim},) finite numbers, got {point}")
+    if image.free and (dim != 1 or not body.material.linear):
+        raise ValueError(
+            f"mirror: FreeEnd needs 1-D and a linear law such as Bar, got {dim}-D and {type(body.material).__name__}; "
+            "a free surface needs no ghosts otherwise"
+        )
+    distance = (p - body.x) @ n
+    spacing = np.broadcast_to(body.spacing, len(body.x))
+    if (distance < 0.01 * spacing).any():
+        worst = int(distance.argmin())
+        raise ValueError(
+            f"mirror: particles must lie in front of the plane and off it, got particle {worst} at {body.x[worst]} m, "
+            f"{-distance[worst]:.6g} m along the normal; put the nearest ones half a spacing in front"
+        )
+    sources = np.flatnonzero(distance < depth)
+    if sources.size == 0:
+        raise ValueError(
+            f"mirror: no particle within depth {depth} m of the plane, the nearest is {distance.min():.6g} m away"
+        )
+    shift = 2.0 * distance[sources, None] * n
+    fields = {name: np.concatenate([field, field[sources]]) for name, field in _fields(body)}
+    extended = replace(body, x=np.concatenate([body.x, body.x[sources] + shift]), **fields)
+    ghosts = np.arange(len(body.x), len(extended.x))
+    return extended, MirrorGhosts(body.name, sources, ghosts, p, n, image)
+
+
+def _fields(body: Any) -> list[tuple[str, np.ndarray]]:
+    n, dim = body.x.shape
+    shapes = {"volume": (n,), "spacing": (n,), "velocity": (n, dim)}
+    return [(name, np.broadcast_to(getattr(body, name), shape)) for name, shape in shapes.items()]
+
+
+@functools.cache
+def _make_reflect(space: Space, free: bool) -> Any:
+    real, vec, State = space.real, space.vec, structure(space, "State")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def reflect(
+        sources: wp.array(dtype=wp.int32),
+        ghosts: wp.array(dtype=wp.int32),
+        shifts: wp.array(dtype=vec),
+        point: vec,
+        normal: vec,
+        state: State,
+    ):
+        k = wp.tid()
+        a = sources[k]
+        g = ghosts[k]
+        unit = wp.identity(n=wp.static(space.dim), dtype=real)
+        if wp.static(free):
+            state.v[g] = state.v[a]
+            state.F[g] = unit * real(2.0) - state.F[a]
+            state.x[g] = state.x[a] + shifts[k]
+        else:
+            R = unit - wp.outer(normal, normal) * real(2.0)
+            state.v[g] = R @ state.v[a]
+            state.F[g] = R @ state.F[a] @ R
+            state.x[g] = point + R @ (state.x[a] - point)
+
+    return reflect
+
+
+class BoundMirrorGhosts(Bound):
+    """Writes velocity, deformation gradient and position of the ghosts."""
+
+    def __init__(self, condition: MirrorGhosts, assembly: Assembly):
+        self.space, self.device, self.image = assembly.space, assembly.device, condition.image
+        first = assembly.bodies[condition.body][0] if condition.body in assembly.bodies else 0
+        self.indices = assembly.select(first + condition.ghosts, condition.body, "MirrorGhosts")
+        sources = (first + condition.sources).astype(np.int32)
+        shifts = assembly.X[self.indices] - assembly.X[sources]
+        self._sources = wp.array(sources, dtype=wp.int32, device=self.device)
+        self._ghosts = wp.array(self.indices, dtype=wp.int32, device=self.device)
+        self._shifts = wp.array(shifts.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
+        self._plane = [self.space.vec(*condition.point), self.space.vec(*condition.normal)]
+
+    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+        arguments = [self._sources, self._ghosts, self._shifts, *self._plane, state]
+        wp.launch(_make_reflect(self.space, self.image.free), len(self.indices), arguments, device=self.device)

@@ -1,0 +1,56 @@
+"""Frictionless rollers: no velocity along a normal."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from ..space import Space
+from .base import Assembly, Bound, Boundary, Region, unit_vector
+
+
+@dataclass(frozen=True, eq=False)
+class Roller(Boundary):
+    """v·n = 0 on a region, for any normal n; along an axis ``Fixed(region, axes=...)`` does the same.
+
+    Args:
+        region: particles (see ``Region``); None takes all of the body.
+        normal: direction n that is held, (dim,), of any length.
+        body: name of the body, any by default.
+    """
+
+    region: Region | None
+    normal: Sequence[float]
+    body: str | None = None
+
+    def bind(self, assembly: Assembly) -> "BoundRoller":
+        return BoundRoller(self, assembly)
+
+
+@functools.cache
+def _make_impose(space: Space) -> Any:
+    vec = space.vec
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def impose(indices: wp.array(dtype=wp.int32), normal: vec, v: wp.array(dtype=vec)):
+        a = indices[wp.tid()]
+        v[a] = v[a] - normal * wp.dot(normal, v[a])
+
+    return impose
+
+
+class BoundRoller(Bound):
+    """Removes the velocity along the normal."""
+
+    def __init__(self, condition: Roller, assembly: Assembly):
+        who = type(condition).__name__
+        self.space, self.device = assembly.space, assembly.device
+        self.normal = unit_vector(condition.normal, self.space.dim, who)
+        self.indices = assembly.select(condition.region, condition.body, who)
+        self._indices = wp.array(self.indices, dtype=wp.int32, device=self.device)
+
+    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+        arguments = [self._indices, self.space.vec(*self.normal), state.v]
+        wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)
