@@ -1,4 +1,4 @@
-"""Small clouds with edges and corners, and the library's configuration on them."""
+"""Small clouds with edges and corners, the library's configuration on them, and dense numpy counterparts."""
 
 import numpy as np
 import warp as wp
@@ -30,3 +30,23 @@ def configuration_of(x, volume, h, *, weight=CubicSpline(), real=wp.float64, box
     configuration = Configuration(space, weight, particles, box if box is not None else (0.0,) * dim, "cpu")
     configuration.refresh(state)
     return configuration
+
+
+def cubic(r, h, dim):
+    """Cubic spline W(r, h)."""
+    q = r / h
+    w = np.where(q < 1, 1 - 1.5 * q**2 + 0.75 * q**3, np.where(q < 2, 0.25 * (2 - q) ** 3, 0.0))
+    return {1: 2 / 3, 2: 10 / (7 * np.pi), 3: 1 / np.pi}[dim] * w / h**dim
+
+
+def dense_N(x, volume, h, linear):
+    """N_ab = V_b W̃_b(x_a) from the definition: W̃_b(x_a) = W_ab (1, x_a − x_b)·c_a with the moments solved densely."""
+    n, dim = x.shape
+    offset = x[:, None] - x[None]
+    W = cubic(np.linalg.norm(offset, axis=-1), 0.5 * (h[:, None] + h[None]), dim)
+    basis = np.concatenate([np.ones((n, n, 1)), offset], axis=-1) if linear else np.ones((n, n, 1))
+    moments = np.einsum("ab,abi,abj->aij", W * volume, basis, basis)
+    first = np.zeros((n, basis.shape[-1], 1))
+    first[:, 0] = 1.0
+    c = np.linalg.solve(moments, first)[..., 0]
+    return W * volume * np.einsum("abi,ai->ab", basis, c)

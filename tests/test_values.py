@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import warp as wp
-from clouds import cloud, configuration_of
+from clouds import cloud, configuration_of, cubic, dense_N
 
 from warp_eulsph import Space
 from warp_eulsph.fields import allocate
@@ -17,12 +17,6 @@ DIMS = [1, 2, 3]
 VALUES = [Shepard(), Linear()]
 
 
-def cubic(r, h, dim):
-    q = r / h
-    w = np.where(q < 1, 1 - 1.5 * q**2 + 0.75 * q**3, np.where(q < 2, 0.25 * (2 - q) ** 3, 0.0))
-    return {1: 2 / 3, 2: 10 / (7 * np.pi), 3: 1 / np.pi}[dim] * w / h**dim
-
-
 def jittered(dim, varied=True):
     """Configuration with unequal volumes and smoothing lengths, and its numpy counterparts."""
     x, volume = cloud(dim, SIDE[dim])
@@ -32,19 +26,6 @@ def jittered(dim, varied=True):
         volume = volume * rng.uniform(0.8, 1.2, len(x))
         h = h * rng.uniform(0.9, 1.1, len(x))
     return configuration_of(x, volume, h), x, volume, h
-
-
-def dense_N(x, volume, h, linear):
-    """N_ab = V_b W̃_b(x_a) from the definition: W̃_b(x_a) = W_ab (1, x_a − x_b)·c_a with the moments solved densely."""
-    n, dim = x.shape
-    offset = x[:, None] - x[None]
-    W = cubic(np.linalg.norm(offset, axis=-1), 0.5 * (h[:, None] + h[None]), dim)
-    basis = np.concatenate([np.ones((n, n, 1)), offset], axis=-1) if linear else np.ones((n, n, 1))
-    moments = np.einsum("ab,abi,abj->aij", W * volume, basis, basis)
-    first = np.zeros((n, basis.shape[-1], 1))
-    first[:, 0] = 1.0
-    c = np.linalg.solve(moments, first)[..., 0]
-    return W * volume * np.einsum("abi,ai->ab", basis, c)
 
 
 def rows(values, real=wp.float64):

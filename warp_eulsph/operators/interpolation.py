@@ -51,6 +51,45 @@ def make_interpolate(weight: Weight, space: Space, components: int, transpose: b
     return interpolate
 
 
+@functools.cache
+def make_mass_diagonals(weight: Weight, space: Space) -> Any:
+    """Kernel: M^L_aa = Σ_c m_c N_a(x_c), lumped, and M^C_aa = Σ_c m_c N_a(x_c)², the diagonal of Nᵀ diag(m) N [kg]."""
+    real, vec = space.real, space.vec
+    Particles, Reference, Neighbours = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        neighbour_structure(space),
+    )
+    separation, W_of, corrected = difference(space), value(weight, space), corrected_value(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def mass_diagonals(
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        alpha: wp.array(dtype=real),
+        beta: wp.array(dtype=vec),
+        lumped: wp.array(dtype=real),
+        consistent: wp.array(dtype=real),
+    ):
+        a = wp.tid()
+        x_a, h_a, V_a = reference.x[a], particles.h[a], reference.V[a]
+        N = V_a * alpha[a] * W_of(real(0.0), h_a)
+        lumped_a = particles.mass[a] * N
+        consistent_a = lumped_a * N
+        for k in range(near.start[a], near.start[a + 1]):
+            c = near.index[k]
+            offset = separation(reference.x[c], x_a, near.box)
+            W = W_of(wp.length(offset), real(0.5) * (h_a + particles.h[c]))
+            N = V_a * corrected(alpha[c], beta[c], offset, W)
+            lumped_a += particles.mass[c] * N
+            consistent_a += particles.mass[c] * N * N
+        lumped[a] = lumped_a
+        consistent[a] = consistent_a
+
+    return mass_diagonals
+
+
 class Interpolation:
     """N and Nᵀ on one reference; call ``refresh`` when the reference has changed.
 
@@ -93,3 +132,8 @@ class Interpolation:
         """``out`` ← S(f) of M6 for rows ``f`` (n,) of c reals."""
         kernel = make_average(self.weight, self.space, wp.types.type_size(f.dtype))
         wp.launch(kernel, len(f), [*self._arguments, f, out], device=self.device)
+
+    def mass_diagonals(self, lumped: wp.array, consistent: wp.array) -> None:
+        """M^L_aa and M^C_aa [kg] of the mass matrices lumped and consistent with N, (n,) each."""
+        kernel = make_mass_diagonals(self.weight, self.space)
+        wp.launch(kernel, len(lumped), [*self._arguments, lumped, consistent], device=self.device)

@@ -9,6 +9,7 @@ import warp as wp
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
 from .reference import Configuration
+from .sensor import Sensor
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Upwind:
     """
 
     epsilon: float = 1.0
-    sensor: Any = None
+    sensor: Sensor | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.epsilon <= 2.0:

@@ -14,16 +14,17 @@ from .reference import Configuration
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "correction", "stepping")
+ACCOUNTS = ("external", "constraint", "dissipation", "correction", "limiter", "stepping")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space) -> Any:
+def _make_entries(space: Space, limited: bool) -> Any:
     """Kernel: what each mechanism did to particle a in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
+    The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW.
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -46,6 +47,8 @@ def _make_entries(space: Space) -> Any:
         v_old: wp.array(dtype=vec),
         W_old: wp.array(dtype=wide),
         W: wp.array(dtype=wide),
+        dv_limited: wp.array(dtype=vec),
+        dW_limited: wp.array(dtype=wide),
         clock: Clock,
         forces: Forces,
         out: wp.array(dtype=_Entry),
@@ -59,11 +62,16 @@ def _make_entries(space: Space) -> Any:
         internal = precise(forces.internal[a])
         strain_power = wide(reference.V[a]) * wp.ddot(precise_mat(Q[a]), precise_mat(grad_v[a]))
         stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
+        limiter = wide(0.0)
+        if wp.static(limited):
+            limiter = mass * wp.dot(precise(dv_limited[a]), v_mean) + dW_limited[a]
+            stepping -= dW_limited[a]
         out[a] = _Entry(
             dt * wp.dot(precise(forces.external[a]), v_mean),
             wp.dot(impulse, v_mean),
             dt * wp.dot(precise(forces.dissipation[a]), v_mean),
             dt * wp.dot(precise(forces.correction[a]), v_mean),
+            limiter,
             stepping,
         )
         if dt > wide(0.0):
@@ -72,6 +80,16 @@ def _make_entries(space: Space) -> Any:
         W_old[a] = W[a]
 
     return entries
+
+
+@functools.cache
+def _make_subtract() -> Any:
+    @wp.kernel(module="unique", enable_backward=False)
+    def subtract(value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
+        a = wp.tid()
+        out[a] = value[a] - out[a]
+
+    return subtract
 
 
 @functools.cache
@@ -98,16 +116,27 @@ def _make_book() -> Any:
 
 
 class Ledger:
-    """Energy accounts on the device, booked every step in float64 and read when asked."""
+    """Energy accounts on the device, booked every step in float64 and read when asked.
+
+    ``limiter`` is None, or has the velocity change ``dv`` [m/s] that it made in the step, (n,) of vec.
+    """
 
     def __init__(
-        self, space: Space, particles: Any, flux: Flux, configuration: Configuration, clock: DeviceClock, device: Any
+        self,
+        space: Space,
+        particles: Any,
+        flux: Flux,
+        configuration: Configuration,
+        clock: DeviceClock,
+        limiter: Any,
+        device: Any,
     ):
         n = len(particles.mass)
         self.space, self.particles, self.flux, self.device = space, particles, flux, device
-        self.configuration, self.clock = configuration, clock
+        self.configuration, self.clock, self.limiter = configuration, clock, limiter
         self._v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
+        self._dW_limited = wp.zeros(n if limiter is not None else 0, dtype=wp.float64, device=device)
         self._entries = wp.zeros(n, dtype=_Entry, device=device)
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy = wp.zeros(1, dtype=wp.float64, device=device)
@@ -121,12 +150,23 @@ class Ledger:
         self._total.zero_()
         self.start = self.kinetic(U) + self.stored(U)
 
+    def open_limiter(self, U: Any) -> None:
+        """Note the stored energies before the limiter changes ``U``."""
+        self.flux.energy(U.F, self._dW_limited)
+
+    def close_limiter(self, U: Any) -> None:
+        """Note what the limiter did to the stored energies."""
+        self.flux.energy(U.F, self._W)
+        wp.launch(_make_subtract(), len(self._W), [self._W, self._dW_limited], device=self.device)
+
     def record(self, U: Any, half: Any, grad_v: wp.array, forces: Any) -> None:
         """Book a step that ended in ``U``, with the half state, ∇v^{n+½} and the forces of the full step."""
         self.flux.energy(U.F, self._W)
         arguments = [self.particles, self.configuration.fields, U, half, self.flux.fields.Q, grad_v]
-        arguments += [self._v_old, self._W_old, self._W, self.clock.fields, forces, self._entries]
-        wp.launch(_make_entries(self.space), len(self._W), arguments, device=self.device)
+        dv_limited = self.limiter.dv if self.limiter is not None else self._v_old
+        arguments += [self._v_old, self._W_old, self._W, dv_limited, self._dW_limited]
+        arguments += [self.clock.fields, forces, self._entries]
+        wp.launch(_make_entries(self.space, self.limiter is not None), len(self._W), arguments, device=self.device)
         self._sum_entries(self._entries, self._step)
         wp.launch(_make_book(), 1, [self._step, self._total], device=self.device)
 
