@@ -48,28 +48,44 @@ def make_pair_sums(weight: Weight, space: Space) -> Any:
 
 
 @functools.cache
-def make_correct(space: Space) -> Any:
-    """Kernel: L_a = K_a⁻¹, the pseudo-inverse where an eigenvalue is below ``CUTOFF``; ``poor`` counts those (M3)."""
+def corrected_inverse(space: Space) -> Any:
+    """``wp.func`` K⁻¹, the pseudo-inverse where an eigenvalue of K is below ``CUTOFF``."""
     real, mat, dim = space.real, space.mat, space.dim
-    Reference = structure(space, "Reference")
     invert, bounds, eigen = inverse(space), symmetric_bounds(space), symmetric_eigen(space)
 
-    @wp.kernel(module="unique", enable_backward=False)
-    def correct(K: wp.array(dtype=mat), reference: Reference, poor: wp.array(dtype=wp.int32)):
-        a = wp.tid()
-        lacking = int(0)
-        if bounds(K[a])[0] >= real(CUTOFF):
-            reference.L[a] = invert(K[a])
+    @wp.func
+    def corrected_inverse(K: mat) -> mat:
+        L = mat()
+        if bounds(K)[0] >= real(CUTOFF):
+            L = invert(K)
         else:
-            R, values = eigen(K[a])
-            L = mat()
+            R, values = eigen(K)
             for i in range(wp.static(dim)):
                 if values[i] >= real(CUTOFF):
                     axis = wp.transpose(R)[i]
                     L += wp.outer(axis, axis) / values[i]
-                else:
+        return L
+
+    return corrected_inverse
+
+
+@functools.cache
+def make_correct(space: Space) -> Any:
+    """Kernel: L_a from K_a (M3), and ``poor``: directions in which a particle fell back."""
+    real, mat, dim = space.real, space.mat, space.dim
+    Reference = structure(space, "Reference")
+    invert, bounds, eigen = corrected_inverse(space), symmetric_bounds(space), symmetric_eigen(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def correct(K: wp.array(dtype=mat), reference: Reference, poor: wp.array(dtype=wp.int32)):
+        a = wp.tid()
+        reference.L[a] = invert(K[a])
+        lacking = int(0)
+        if bounds(K[a])[0] < real(CUTOFF):
+            _, values = eigen(K[a])
+            for i in range(wp.static(dim)):
+                if values[i] < real(CUTOFF):
                     lacking += 1
-            reference.L[a] = L
         poor[a] = lacking
 
     return correct
