@@ -78,7 +78,7 @@ class BoundTraction(Bound):
         self.areas.assign(areas.astype(self.space.numpy))
         if areas.min() > -0.01 * np.abs(areas).max():
             log.warning(
-                "Traction: the region seems to hold only the outermost layer of the face, whose areas sum to %.6g, more "
+                "Traction: the region seems to hold only the outermost layer of a face, whose areas sum to %.6g, more "
                 "than the face; select particles down to two support radii beneath it",
                 areas.sum(),
             )
