@@ -309,7 +309,7 @@ def liquid(rate: np.ndarray) -> es.Body:
 
 
 def test_liquid_forgets_shear():
-    """Simple shear to an angle of 1 leaves F = I, no stress and the velocities; the surface tension of M11 is zero."""
+    """Simple shear to an angle of 1 leaves F = I and hence no stress: the velocities stay."""
     body = liquid(np.array([[0.0, 10.0], [0.0, 0.0]]))
     simulation = es.Simulation(body, time_step=es.TimeStep(fixed=1e-3))
     simulation.step(100)
@@ -319,7 +319,7 @@ def test_liquid_forgets_shear():
 
 
 def test_liquid_keeps_its_volume_ratio():
-    """One step of v = L x: J = det(I + Δt L) det-exactly, and F = √J I."""
+    """One step of v = L x gives J = det(I + Δt L) and F = √J I."""
     rate = np.array([[-8.0, 10.0], [1.0, 3.0]])
     simulation = es.Simulation(liquid(rate), time_step=es.TimeStep(fixed=1e-3))
     simulation.step()
