@@ -79,8 +79,14 @@ def _make_search(space: Space, fill: bool) -> Any:
                     if inside:
                         for b in wp.hash_grid_query(grid, p, reach, body[a]):
                             if b != a and body[b] == body[a]:
+                                # The query returns whole cells: in a small box it meets b from several images
+                                nearest = bool(True)
+                                for i in range(wp.static(dim if space.periodic else 0)):
+                                    if box[i] > real(0.0):
+                                        away = wp.abs(padded[b][i] - p[i])
+                                        nearest = nearest and away < real(0.5) * box[i]
                                 r = wp.length(separation(x[b], x[a], box))
-                                if r < support * real(0.5) * (h[a] + h[b]):
+                                if nearest and r < support * real(0.5) * (h[a] + h[b]):
                                     if wp.static(fill):
                                         k = row + n
                                         while k > row and index[k - 1] > b:
