@@ -195,7 +195,7 @@ def orders(dim, levels, reference):
 @pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
 def test_second_order_in_2d(reference):
     """v, F and P: least-squares order of four levels ≥ 1.9."""
-    observed, errors = orders(2, [24, 32, 40, 56], reference)
+    observed, errors = orders(2, [48, 64, 80, 112], reference)
     print(observed, errors)
     assert observed.min() >= 1.9
 
@@ -203,6 +203,6 @@ def test_second_order_in_2d(reference):
 @pytest.mark.slow
 @pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
 def test_second_order_in_3d(reference):
-    observed, errors = orders(3, [20, 28, 36, 48], reference)
+    observed, errors = orders(3, [36, 44, 52, 60], reference)
     print(observed, errors)
     assert observed.min() >= 1.9

@@ -45,7 +45,10 @@ FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
     "Pi": Field("mat", "Pa", "stress times correction, Q L (M5)"),
     "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
-    "shear_speed": Field("real", "m/s", "shear-wave speed measured in the reference"),
+    "impedance": Field("real", "kg/(m^2 s)", "density times pressure-wave speed, both measured in the reference (M9)"),
+    "shear_impedance": Field(
+        "real", "kg/(m^2 s)", "density times shear-wave speed, both measured in the reference (M9)"
+    ),
 }
 FORCES = {
     "internal": Field("vec", "N", "internal force -T of the dual divergence (M5)"),

@@ -32,18 +32,19 @@ class Upwind:
 
 @functools.cache
 def upwind(space: Space) -> Any:
-    """``wp.func`` force on a from b [N]: A_ab ½ρ_ab [c_p n⊗n + c_s (I − n⊗n)] · jump (M9), A_ab = V_a V_b |W'|.
+    """``wp.func`` force on a from b [N]: A_ab ½ [Z n⊗n + Z_s (I − n⊗n)] · jump (M9), A_ab = V_a V_b |W'|.
 
-    Args (of the function): ξ = x_b − x_a, V_a V_b g_ab, ρ_ab c_p, ρ_ab c_s, velocity jump.
+    Z = ½ (ρc_a + ρc_b) is the mean impedance of pressure waves, Z_s of shear waves.
+
+    Args (of the function): ξ = x_b − x_a, V_a V_b g_ab, the sums 2Z and 2Z_s, velocity jump.
     """
     real, vec = space.real, space.vec
 
     @wp.func
-    def upwind(xi: vec, VVg: real, impedance: real, shear_impedance: real, jump: vec) -> vec:
-        r = wp.length(xi)
-        n = xi / r
-        normal = n * wp.dot(n, jump)
-        return (normal * impedance + (jump - normal) * shear_impedance) * (VVg * r * real(0.5))
+    def upwind(xi: vec, VVg: real, Z: real, Z_shear: real, jump: vec) -> vec:
+        rr = wp.dot(xi, xi)
+        normal = xi * (wp.dot(xi, jump) * (Z - Z_shear) / rr)
+        return (normal + jump * Z_shear) * (VVg * wp.sqrt(rr) * real(0.25))
 
     return upwind
 
@@ -68,13 +69,12 @@ def blend(space: Space) -> Any:
 def make_dissipation(space: Space, sensed: bool) -> Any:
     """Kernel: D_a of M9; antisymmetric in the pair."""
     real, vec, mat = space.real, space.vec, space.mat
-    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     Neighbours = neighbour_structure(space)
     separation, pair_force, mix = difference(space), upwind(space), blend(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate(
-        particles: Particles,
         reference: Reference,
         near: Neighbours,
         flux: Flux,
@@ -89,15 +89,13 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
         V_a = reference.V[a]
         v_a = v[a]
         grad_a = grad_v[a]
-        rho_a = particles.mass[a] / V_a
-        c_a = flux.speed[a]
-        s_a = flux.shear_speed[a]
+        Z_a = flux.impedance[a]
+        Z_shear_a = flux.shear_impedance[a]
         force = vec()
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             V_b = reference.V[b]
             xi = separation(reference.x[b], x_a, near.box)
-            rho = real(0.25) * (rho_a + particles.mass[b] / V_b)
             plain = v[b] - v_a
             jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
             if wp.static(sensed):
@@ -105,7 +103,7 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
             else:
                 jump = jump * epsilon
             force += pair_force(
-                xi, V_a * V_b * near.g[k], rho * (c_a + flux.speed[b]), rho * (s_a + flux.shear_speed[b]), jump
+                xi, V_a * V_b * near.g[k], Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b], jump
             )
         out[a] = force
 
@@ -115,8 +113,8 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
 class UpwindForces:
     """M9 alone, for references that need no correction."""
 
-    def __init__(self, space: Space, particles: Any, device: Any):
-        self.space, self.particles, self.device = space, particles, device
+    def __init__(self, space: Space, device: Any):
+        self.space, self.device = space, device
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Nothing to prepare: M9 needs the lists only."""
@@ -132,6 +130,6 @@ class UpwindForces:
         forces: Any,
     ) -> None:
         """Dissipation (M9) into ``forces.dissipation``."""
-        arguments = [self.particles, configuration.fields, configuration.near, flux, v, grad_v, epsilon]
+        arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
         arguments += [sensor if sensor is not None else v, forces.dissipation]
         wp.launch(make_dissipation(self.space, sensor is not None), len(v), arguments, device=self.device)

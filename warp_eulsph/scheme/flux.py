@@ -65,9 +65,13 @@ def _make_wave_speeds(space: Space, law: Law) -> Any:
         shortening = wp.sqrt(bounds(wp.transpose(G_inverse) @ G_inverse)[1])
         rho_0 = particles.mass[a] / particles.V0[a]
         M = moduli(F[a], c)
-        flux.speed[a] = wp.sqrt(wp.max(M[0], real(0.0)) / rho_0) * shortening
-        flux.shear_speed[a] = wp.sqrt(wp.max(M[1], real(0.0)) / rho_0) * shortening
-        wp.atomic_max(clock.rate, 0, flux.speed[a] / particles.spacing[a])
+        speed = wp.sqrt(wp.max(M[0], real(0.0)) / rho_0) * shortening
+        shear_speed = wp.sqrt(wp.max(M[1], real(0.0)) / rho_0) * shortening
+        rho_k = particles.mass[a] / reference.V[a]
+        flux.speed[a] = speed
+        flux.impedance[a] = rho_k * speed
+        flux.shear_impedance[a] = rho_k * shear_speed
+        wp.atomic_max(clock.rate, 0, speed / particles.spacing[a])
 
     return wave_speeds
 

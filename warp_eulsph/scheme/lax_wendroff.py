@@ -137,11 +137,13 @@ class LaxWendroffStepper:
         self.policy, self.clock, self.conditions = policy, clock, conditions
         self.forces = allocate(space, "Forces", n, device)
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
-        self.grad_F = wp.zeros(n, dtype=space.row_gradient(space.dim**2), device=device)
+        smoothing = options.smoothing
+        needed = n if smoothing is not None and smoothing.needs_gradient else 0
+        self.grad_F = wp.zeros(needed, dtype=space.row_gradient(space.dim**2), device=device)
         self.steps = 0
         counts = [part.size for part in flux.parts]
         if options.correction is None or policy.fixed:
-            self.stabiliser = UpwindForces(space, particles, device)
+            self.stabiliser = UpwindForces(space, device)
         else:
             self.stabiliser = options.correction.build(space, particles, counts, device)
         self.limiter: MassDiffusion | None = None
@@ -151,7 +153,7 @@ class LaxWendroffStepper:
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, particles, device) for sensor in sensors}
         self.smoothed_F_k = configuration.fields.F
-        if options.smoothing is not None and options.smoothing.smooths_reference:
+        if smoothing is not None and smoothing.smooths_reference:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
         self._impose(U, 0.0)
         configuration.refresh(U)

@@ -78,13 +78,12 @@ def admitted(space: Space) -> Any:
 def _make_forces(space: Space, limited: bool, sensed: bool) -> Any:
     """Kernel: M9 and the correction ½ Σ_b φ_ab (Q_a + Q_b) c_ab of M11 and M12 in one walk of the rows."""
     real, vec, mat = space.real, space.vec, space.mat
-    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     Neighbours, Forces = neighbour_structure(space), structure(space, "Forces")
     separation, pair_force, mix, share = difference(space), upwind(space), blend(space), admitted(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate_and_correct(
-        particles: Particles,
         reference: Reference,
         near: Neighbours,
         flux: Flux,
@@ -98,8 +97,7 @@ def _make_forces(space: Space, limited: bool, sensed: bool) -> Any:
     ):
         a = wp.tid()
         x_a, V_a, v_a, grad_a = reference.x[a], reference.V[a], v[a], grad_v[a]
-        rho_a = particles.mass[a] / V_a
-        c_a, s_a, Q_a, psi_a = flux.speed[a], flux.shear_speed[a], flux.Q[a], psi[a]
+        Z_a, Z_shear_a, Q_a, psi_a = flux.impedance[a], flux.shear_impedance[a], flux.Q[a], psi[a]
         dissipation = vec()
         correction = vec()
         for k in range(near.start[a], near.start[a + 1]):
@@ -107,14 +105,13 @@ def _make_forces(space: Space, limited: bool, sensed: bool) -> Any:
             V_b = reference.V[b]
             xi = separation(reference.x[b], x_a, near.box)
             VVg = V_a * V_b * near.g[k]
-            rho = real(0.25) * (rho_a + particles.mass[b] / V_b)
             plain = v[b] - v_a
             jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
             if wp.static(sensed):
                 jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
             else:
                 jump = jump * epsilon
-            upwind_ab = pair_force(xi, VVg, rho * (c_a + flux.speed[b]), rho * (s_a + flux.shear_speed[b]), jump)
+            upwind_ab = pair_force(xi, VVg, Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b], jump)
             f_ab = (Q_a + flux.Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * VVg))
             if wp.static(limited):
                 f_ab = f_ab * share(kappa, -wp.dot(f_ab, plain), wp.dot(upwind_ab, plain))
@@ -130,7 +127,7 @@ class ClosedPairs:
     """The pair areas c_ab = ω_ab (ψ_a − ψ_b) of the present reference, and the forces they correct."""
 
     def __init__(self, option: PairAreas, space: Space, particles: Any, counts: list[int], device: Any):
-        self.option, self.space, self.particles, self.device = option, space, particles, device
+        self.option, self.space, self.device = option, space, device
         self.solver = LaplacianSolver(space, len(particles.mass), device)
         firsts = [sum(counts[:i]) for i in range(len(counts))]
         self.bodies = list(zip(firsts, counts, strict=True))
@@ -158,6 +155,6 @@ class ClosedPairs:
         """Dissipation (M9) and correction (M11, M12) into ``forces``."""
         kernel = _make_forces(self.space, self.option.limited, sensor is not None)
         kappa = self.option.kappa if self.option.limited else 0.0
-        arguments = [self.particles, configuration.fields, configuration.near, flux, v, grad_v, epsilon]
+        arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
         arguments += [sensor if sensor is not None else v, self.solver.psi, kappa, forces]
         wp.launch(kernel, len(v), arguments, device=self.device)

@@ -116,7 +116,7 @@ class SurfaceForces:
     def __init__(self, option: SurfaceVectors, space: Space, particles: Any, counts: list[int], device: Any):
         n = len(particles.mass)
         self.option, self.space, self.particles, self.device = option, space, particles, device
-        self.upwind = UpwindForces(space, particles, device)
+        self.upwind = UpwindForces(space, device)
         self.defect = wp.zeros(n, dtype=space.vec, device=device)
         self.bodies = [(sum(counts[:i]), count) for i, count in enumerate(counts)]
         self._each = wp.zeros(n, dtype=_Sums, device=device)
