@@ -184,8 +184,9 @@ def test_wave_speeds_at_rest(kind, space):
 def test_wave_moduli_bound_the_acoustic_tensor(kind, space, size):
     """The bound is above the fastest wave of any direction, and close to it for small strains."""
     material, dim = example(kind), space.dim
-    if hasattr(material, "poisson"):
-        material = dataclasses.replace(material, poisson=0.3)  # where shear and volume stiffness mix most
+    softer = {"poisson": 0.3, "bulk": 9e6, "c01": 1e5}  # where shear and volume stiffness mix most
+    changes = {name: value for name, value in softer.items() if hasattr(material, name)}
+    material = dataclasses.replace(material, **changes)
     F = random_F(dim, 60, size)
     A, bound = elasticity(material, space, F), evaluate(material, space, F)[2]
     n = np.random.default_rng(3).normal(size=(400, dim))
@@ -323,11 +324,8 @@ def test_liquid_keeps_its_volume_ratio():
     rate = np.array([[-8.0, 10.0], [1.0, 3.0]])
     simulation = es.Simulation(liquid(rate), time_step=es.TimeStep(fixed=1e-3))
     simulation.step()
-    F, J = simulation.F, np.linalg.det(np.eye(2) + 1e-3 * rate)
-    # the half step's velocity differs from L x by the pressure of the half step at the surface, of order Δt²: inside
-    inner = np.abs(simulation.stepper.configuration.fields.x.numpy()).max(axis=1) < 0.1
-    np.testing.assert_allclose(F[inner], np.broadcast_to(np.sqrt(J) * np.eye(2), F[inner].shape), rtol=1e-13)
-    np.testing.assert_allclose(simulation.J, J, rtol=1e-3)
+    J = np.linalg.det(np.eye(2) + 1e-3 * rate)
+    np.testing.assert_allclose(simulation.F, np.broadcast_to(np.sqrt(J) * np.eye(2), (36, 2, 2)), rtol=1e-13)
 
 
 @pytest.mark.parametrize("policy", [es.Never(), es.Every(2), es.WhenDistorted(1.1)])
