@@ -95,7 +95,7 @@ def draw(histories: dict[str, dict[str, np.ndarray]], path: Path) -> None:
     above.plot(1e6 * exact["t"], 1e6 * exact["u_exact"], "k--", lw=1, label="exact")
     below.plot(1e6 * exact["t"], exact["v_exact"], "k--", lw=1)
     above.set_ylabel("end displacement [µm]")
-    above.legend(ncols=4, loc="upper right")
+    above.legend(ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     below.set(xlabel="time [µs]", ylabel="end velocity [m/s]")
     figure.tight_layout()
     figure.savefig(path, dpi=120)

@@ -91,7 +91,9 @@ def draw(history: dict[str, np.ndarray], series: np.ndarray, writer: SnapshotWri
     x, y, z = last.x.T
     dots = right.scatter(x, z, y, c=1e-6 * last.fields["pressure"], s=8, cmap="coolwarm")
     figure.colorbar(dots, label="pressure [MPa]")
-    right.set(title=f"{1e3 * last.time:g} ms", box_aspect=(1, 1, 4), xlim=(-0.8, 0.8), ylim=(-0.8, 0.8))
+    right.set(
+        title=f"{1e3 * last.time:g} ms", box_aspect=(1, 1, 4), xlim=(-0.8, 0.8), ylim=(-0.8, 0.8), xticks=(), yticks=()
+    )
     figure.tight_layout()
     figure.savefig(path, dpi=120)
     plt.close(figure)

@@ -1,0 +1,90 @@
+"""Every example runs, small: figures in their bands (it exits otherwise), picture and snapshots there."""
+
+import importlib
+import json
+from pathlib import Path
+
+import pytest
+
+from warp_eulsph.output import read_snapshot
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run an example's main into a fresh directory: (figures, number of frames)."""
+
+    def run(name, *options):
+        monkeypatch.syspath_prepend(str(EXAMPLES))
+        figures = importlib.import_module(name).main([*options, "--output", str(tmp_path / name)])
+        picture = tmp_path / name / f"{name}.png"
+        assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 10_000
+        listing = json.loads((tmp_path / name / "run.vtkhdf.series").read_text())["files"]
+        last = read_snapshot(tmp_path / name / listing[-1]["name"])
+        assert last.time == listing[-1]["time"] > 0.0
+        return figures, len(listing)
+
+    return run
+
+
+def test_bar(run):
+    figures, frames = run("bar")
+    assert frames == 51
+    # The benchmark's figure for a correct 40-particle Lax-Wendroff scheme is 0.135.
+    assert figures["Eulerian: rms displacement error / amplitude"] < 0.14
+    assert figures["total Lagrangian: rms displacement error / amplitude"] < 0.14
+    assert figures["Eulerian, limiter: overshoot / amplitude"] < 0.05 < figures["Eulerian: overshoot / amplitude"]
+
+
+@pytest.mark.slow
+def test_bar_converges_at_first_order(run):
+    errors = []
+    for n in (40, 160, 640):
+        figures, _ = run("bar", "-n", str(n))
+        errors.append(figures["Eulerian: rms displacement error / amplitude"])
+    assert errors[2] < 0.01
+    # First order over two factors of four: 16; a tenth of the order either way.
+    assert 12.0 < errors[0] / errors[2] < 21.0 and errors[0] > errors[1] > errors[2]
+
+
+@pytest.mark.parametrize("reference", ["total", "updated", "eulerian"])
+def test_spinning_plate(run, reference):
+    figures, frames = run("spinning_plate", "-n", "12", "--reference", reference)
+    assert frames == 11
+    assert figures["corner radius, rms error / range"] < 0.2
+    assert abs(figures["angular momentum kept"] - 1.0) < 0.01
+    assert figures["ledger residual / energy"] < 1e-12
+
+
+def test_spinning_plate_converges(run):
+    coarse, _ = run("spinning_plate", "-n", "12")
+    fine, _ = run("spinning_plate", "-n", "24")
+    for name in ("corner radius, rms error / range", "strain energy, rms error / largest"):
+        assert fine[name] < 0.75 * coarse[name]
+
+
+def test_bending_column(run):
+    figures, _ = run("bending_column", "-n", "6", "--reference", "total")
+    assert figures["energy kept"] > 0.95
+    assert figures["its relative error"] == pytest.approx(0.04, abs=0.03)
+
+
+def test_twisting_column(run):
+    figures, _ = run("twisting_column", "-n", "4")
+    # A coarse column turns too far, by 13 % at 6 across and less at 8: the reference is approached from above.
+    assert 337.5 < figures["largest rotation [degrees]"] < 440.0
+    assert figures["largest energy / first"] <= 1.0 + 1e-4
+
+
+def test_punch(run):
+    figures, frames = run("punch", "-n", "16")
+    assert frames == 11
+    assert figures["least volume ratio"] > 0.0
+    assert figures["reaction at 10 ms [MN/m]"] == pytest.approx(3.15, rel=0.1)
+
+
+def test_failed_check_ends_the_example(run):
+    """Six particles along the block's side are too few for the reaction at 15 ms."""
+    with pytest.raises(SystemExit, match=r"outside the accepted band: \['reaction at 15 ms"):
+        run("punch", "-n", "6")

@@ -1,0 +1,98 @@
+"""The house rules that a program can hold: layers, who imports HDF5, lengths, no print."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "warp_eulsph"
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+# Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
+LAYERS = [
+    {"space", "linalg"},
+    {"fields", "weights", "materials", "boundaries", "reduce"},
+    {"operators"},
+    {"scheme", "contact"},
+    {"simulation", "schedule", "diagnostics", "output", "geometry"},
+    {"cases", "cli"},
+]
+LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
+MAX_LINES, MAX_KERNEL_LINES = 400, 60
+
+
+def room(path):
+    """First name below the package: ``scheme/flux.py`` is in ``scheme``, ``space.py`` is ``space``."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports(path):
+    """(room imported, line) of the package's own, and (name, line) of other top-level packages."""
+    own, foreign = [], []
+    package = [PACKAGE.name, *path.relative_to(PACKAGE).parts[:-1]]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else []
+            module = [*base, *(node.module.split(".") if node.module else [])]
+            names = [module] if len(module) > 1 or not node.level else [[*module, a.name] for a in node.names]
+        else:
+            continue
+        for parts in names:
+            if parts[0] == PACKAGE.name:
+                own += [(parts[1], node.lineno)] if len(parts) > 1 else []
+            else:
+                foreign.append((parts[0], node.lineno))
+    return own, foreign
+
+
+def kernels(path):
+    """(name, lines) of every function decorated as a Warp kernel."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef) and any("wp.kernel" in ast.unparse(d) for d in node.decorator_list):
+            yield node.name, node.end_lineno - node.lineno + 1
+
+
+def test_there_is_something_to_check():
+    assert len(FILES) > 30 and sum(len(list(kernels(path))) for path in FILES) > 20
+    own = {name for path in FILES for name, _ in imports(path)[0]}
+    assert {"space", "fields", "materials", "operators", "scheme"} <= own
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+class TestFile:
+    def test_has_a_layer_and_never_imports_upwards(self, path):
+        if path == PACKAGE / "__init__.py":
+            return  # the front door shows every room
+        assert room(path) in LAYER, f"{room(path)} has no layer; give it one in LAYERS"
+        own, _ = imports(path)
+        upwards = [f"line {line}: {name}" for name, line in own if LAYER[name] > LAYER[room(path)]]
+        assert not upwards, upwards
+
+    def test_only_output_imports_h5py(self, path):
+        _, foreign = imports(path)
+        assert room(path) == "output" or "h5py" not in dict(foreign)
+
+    def test_is_short(self, path):
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= MAX_LINES
+        long = [(name, lines) for name, lines in kernels(path) if lines > MAX_KERNEL_LINES]
+        assert not long, f"kernels of at most {MAX_KERNEL_LINES} lines, got {long}"
+
+    def test_logs_instead_of_printing(self, path):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        prints = [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "print"]
+        assert not prints, f"print in lines {prints}; use logging"
+
+    def test_leaves_nothing_for_later(self, path):
+        text = path.read_text(encoding="utf-8")
+        assert not [word for word in ("TO" + "DO", "FIX" + "ME", "X" * 3) if word in text]
+
+
+def test_importing_the_package_does_not_load_hdf5_or_pictures():
+    import subprocess
+    import sys
+
+    code = "import sys, warp_eulsph; print([m for m in ('h5py', 'matplotlib', 'vtk') if m in sys.modules])"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert shown.strip().splitlines()[-1] == "[]"
