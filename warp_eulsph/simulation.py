@@ -13,7 +13,8 @@ from .fields import allocate
 from .materials import Material
 from .scheme.flux import Flux, check_reference
 from .scheme.health import UnstableError
-from .scheme.lax_wendroff import LaxWendroff, LaxWendroffStepper
+from .scheme.lax import Lax
+from .scheme.lax_wendroff import LaxWendroff
 from .scheme.reference import Always, Configuration, ReferencePolicy
 from .scheme.time_step import DeviceClock, TimeStep
 from .space import Space
@@ -84,7 +85,7 @@ class Simulation:
         bodies: one or several ``Body``; particles of different bodies are never neighbours.
         boundaries: conditions, imposed in this order.
         reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian.
-        scheme: LaxWendroff options.
+        scheme: LaxWendroff options, or those of the one-step Lax.
         time_step: TimeStep options.
         weight: SPH weight.
         dilation: smoothing length over spacing.
@@ -103,7 +104,7 @@ class Simulation:
         *,
         boundaries: Sequence[Boundary] = (),
         reference: ReferencePolicy = Always(),
-        scheme: LaxWendroff = LaxWendroff(),
+        scheme: LaxWendroff | Lax = LaxWendroff(),
         time_step: TimeStep = TimeStep(),
         weight: Weight = CubicSpline(),
         dilation: float = 1.3,
@@ -131,8 +132,8 @@ class Simulation:
         configuration = Configuration(self.space, weight, self.particles, box, self.device)
         self.clock = DeviceClock(self.space, time_step, self.device)
         U = self._state(X)
-        self.stepper = LaxWendroffStepper(
-            scheme, self.space, U, self.particles, flux, configuration, reference, self.clock, self.conditions
+        self.stepper = scheme.build(
+            self.space, U, self.particles, flux, configuration, reference, self.clock, self.conditions
         )
         self._check_neighbourhoods(X)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)

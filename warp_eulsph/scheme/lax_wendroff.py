@@ -43,10 +43,14 @@ class LaxWendroff:
     correction: Any = PairAreas()
     limiter: FluxCorrectedTransport | None = None
 
+    def build(self, *parts: Any) -> "LaxWendroffStepper":
+        """The scheme at work; ``parts`` are the arguments of the stepper after its options."""
+        return LaxWendroffStepper(self, *parts)
+
 
 @functools.cache
 def _make_predict(space: Space) -> Any:
-    """Kernel: the half step, from ``half`` = S(U) (M8)."""
+    """Kernel: the half step, ``fraction`` = ½, from ``half`` = S(U) (M8); the one-step Lax scheme has 1."""
     real, mat = space.real, space.mat
     Particles, State, Forces = structure(space, "Particles"), structure(space, "State"), structure(space, "Forces")
     Clock, invert, cof = clock_structure(space), inverse(space), cofactor(space)
@@ -59,10 +63,11 @@ def _make_predict(space: Space) -> Any:
         grad_v: wp.array(dtype=mat),
         forces: Forces,
         clock: Clock,
+        fraction: wp.float64,
         half: State,
     ):
         a = wp.tid()
-        tau = real(wp.float64(0.5) * clock.dt[0])
+        tau = real(fraction * clock.dt[0])
         force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
         half.v[a] = half.v[a] + force * (tau / particles.mass[a])
         dF = grad_v[a] @ smoothed_F_k[a] * tau
@@ -114,13 +119,14 @@ class LaxWendroffStepper:
     """The scheme at work on one set of particles.
 
     Attributes:
+        options: LaxWendroff, or those of a scheme that shares its parts.
         U: state at tⁿ (struct ``State``); ``half``: state at t^{n+½}.
         configuration: the reference k. clock: time on the device. ledger: where the energy went.
     """
 
     def __init__(
         self,
-        options: LaxWendroff,
+        options: Any,
         space: Space,
         U: Any,
         particles: Any,
@@ -174,7 +180,7 @@ class LaxWendroffStepper:
         self._stress(U)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, 0.0)  # M5, M9, M11, M12
         self._smooth(U, half)  # M6 or M7: S(U)
-        self._predict(U, half)  # M8: U^{n+½}
+        self._predict(U, half, 0.5)  # M8: U^{n+½}
         self._impose(half, 0.5)
         self._velocity_gradient(half)  # M4
         self._stress(half)  # M1
@@ -240,8 +246,8 @@ class LaxWendroffStepper:
         self._smooth_field(U.v, self.grad_v, half.v)
         self._smooth_field(U.F, self.grad_F, half.F)
 
-    def _predict(self, U: Any, half: Any) -> None:
-        arguments = [self.particles, U, self.smoothed_F_k, self.grad_v, self.forces, self.clock.fields, half]
+    def _predict(self, U: Any, half: Any, fraction: float) -> None:
+        arguments = [self.particles, U, self.smoothed_F_k, self.grad_v, self.forces, self.clock.fields, fraction, half]
         wp.launch(_make_predict(self.space), self.n, arguments, device=self.device)
 
     def _correct(self, U: Any, half: Any) -> None:

@@ -19,12 +19,13 @@ _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, limited: bool) -> Any:
+def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
     """Kernel: what each mechanism did to particle a in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
-    The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW.
+    The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
+    scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -47,7 +48,7 @@ def _make_entries(space: Space, limited: bool) -> Any:
         v_old: wp.array(dtype=vec),
         W_old: wp.array(dtype=wide),
         W: wp.array(dtype=wide),
-        dv_limited: wp.array(dtype=vec),
+        dv: wp.array(dtype=vec),
         dW_limited: wp.array(dtype=wide),
         clock: Clock,
         forces: Forces,
@@ -64,8 +65,10 @@ def _make_entries(space: Space, limited: bool) -> Any:
         stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
         limiter = wide(0.0)
         if wp.static(limited):
-            limiter = mass * wp.dot(precise(dv_limited[a]), v_mean) + dW_limited[a]
+            limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
             stepping -= dW_limited[a]
+        if wp.static(smoothed):
+            stepping += mass * wp.dot(precise(dv[a]), v_mean)
         out[a] = _Entry(
             dt * wp.dot(precise(forces.external[a]), v_mean),
             wp.dot(impulse, v_mean),
@@ -159,14 +162,20 @@ class Ledger:
         self.flux.energy(U.F, self._W)
         wp.launch(_make_subtract(), len(self._W), [self._W, self._dW_limited], device=self.device)
 
-    def record(self, U: Any, half: Any, grad_v: wp.array, forces: Any) -> None:
-        """Book a step that ended in ``U``, with the half state, ∇v^{n+½} and the forces of the full step."""
+    def record(self, U: Any, half: Any, grad_v: wp.array, forces: Any, smoothed: wp.array | None = None) -> None:
+        """Book a step that ended in ``U``, with the half state, ∇v^{n+½} and the forces of the full step.
+
+        ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (n,) of vec.
+        """
         self.flux.energy(U.F, self._W)
         arguments = [self.particles, self.configuration.fields, U, half, self.flux.fields.Q, grad_v]
-        dv_limited = self.limiter.dv if self.limiter is not None else self._v_old
-        arguments += [self._v_old, self._W_old, self._W, dv_limited, self._dW_limited]
+        dv = smoothed
+        if dv is None:
+            dv = self.limiter.dv if self.limiter is not None else self._v_old
+        arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
         arguments += [self.clock.fields, forces, self._entries]
-        wp.launch(_make_entries(self.space, self.limiter is not None), len(self._W), arguments, device=self.device)
+        kernel = _make_entries(self.space, self.limiter is not None, smoothed is not None)
+        wp.launch(kernel, len(self._W), arguments, device=self.device)
         self._sum_entries(self._entries, self._step)
         wp.launch(_make_book(), 1, [self._step, self._total], device=self.device)
 

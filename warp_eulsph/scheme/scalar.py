@@ -49,7 +49,7 @@ class OneStepLax(Scheme):
     """U^{n+1} = S(Uⁿ) − Δt ∇·f(Uⁿ): first order, stable to CFL 1 on three particles.
 
     Args:
-        smoothing: S; the scheme is unstable without.
+        smoothing: S; NeighbourAverage() is the paper's. LinearExact() is too weak: long waves grow.
     """
 
     smoothing: Smoothing = NeighbourAverage()
