@@ -43,7 +43,7 @@ def test_step_growth_is_bounded_and_cfl_met():
         steps.append(simulation.dt)
     ratios = np.array(steps[1:]) / np.array(steps[:-1])
     assert ratios.max() <= 1.05 * (1 + 1e-12)
-    c_p = 242.1  # BENCHMARKS, rubber
+    c_p = 242.1  # of this rubber
     assert steps[0] == pytest.approx(0.3 / 6 / c_p, rel=0.03)  # wave_moduli bounds c_p within 3 % at rest
 
 

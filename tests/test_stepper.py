@@ -149,7 +149,7 @@ def test_steps_allocate_nothing():
 
 
 def standing_wave(dim, n, reference, jitter=0.0):
-    """Relative L2 errors of v, F and P of the swinging plate / low-dispersion cube (BENCHMARKS §5), extended
+    """Relative L2 errors of v, F and P of the swinging plate / low-dispersion cube (linear, exact), extended
     periodically: (velocity, F − I, P)."""
     rho, E, nu, amplitude = 1100.0, 17e6, 0.3, 1e-6
     mu, kappa = E / 2 / (1 + nu), E / 3 / (1 - 2 * nu)

@@ -1,4 +1,4 @@
-"""The interpolation N spanned by corrected values, and its transpose (METHOD §5): N_b(x_a) = V_b W̃_b(x_a)."""
+"""The interpolation N spanned by corrected values, and its transpose (docs/method.md §5): N_b(x_a) = V_b W̃_b(x_a)."""
 
 import functools
 from typing import Any

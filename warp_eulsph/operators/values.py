@@ -1,4 +1,4 @@
-"""Corrected values of the weights: W̃_b(x_a) = α_a (1 + β_a·(x_a − x_b)) W_ab (METHOD §2)."""
+"""Corrected values of the weights: W̃_b(x_a) = α_a (1 + β_a·(x_a − x_b)) W_ab (docs/method.md §2)."""
 
 import functools
 from abc import ABC

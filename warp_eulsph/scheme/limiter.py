@@ -18,7 +18,7 @@ LEAST_SHARE = 1.0e-4
 
 @dataclass(frozen=True)
 class FluxCorrectedTransport:
-    """U^{n+1} = U_LW + d × mass diffusion of Uⁿ, for v and F (paper §5, METHOD §5).
+    """U^{n+1} = U_LW + d × mass diffusion of Uⁿ, for v and F (paper §5, docs/method.md §5).
 
     The low-order increment is the high-order one plus the diffusion, so that d = 0 is Lax-Wendroff and d = 1 the low
     order scheme. Component i of v takes d_i, component F_ij takes d_i, the direction of the velocity that drives it.

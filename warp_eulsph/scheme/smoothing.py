@@ -51,8 +51,8 @@ class LinearExact(Smoothing):
 class NeighbourAverage(Smoothing):
     """The paper's smoothing (§4.2): the corrected average over the neighbours alone (M6).
 
-    Stable up to CFL 2 on periodic lattices; on bounded bodies it grows without strong dissipation (METHOD §3), so it is
-    there to reproduce the paper.
+    Stable up to CFL 2 on periodic lattices; on bounded bodies it grows without strong dissipation (docs/method.md §3),
+    so it is there to reproduce the paper.
 
     Args:
         values: Shepard(), exact for constants, or Linear(), exact for linear fields too.
