@@ -45,6 +45,11 @@ def test_first_order():
     assert 0.8 < np.log2(errors[0] / errors[1]) < 1.1
 
 
+def test_linear_exact_smoothing_lets_long_waves_grow():
+    ledger = pulse(Lax(es.LinearExact()), 24, 0.4, dilation=1.3)[0].stepper.ledger
+    assert ledger.accounts()["stepping"] > 0.1 * ledger.start
+
+
 @pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
 def test_books_close_and_energy_falls(reference):
     simulation, _, _ = pulse(Lax(), 24, 0.4, reference, dilation=1.3, amplitude=0.02)

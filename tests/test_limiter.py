@@ -215,6 +215,27 @@ def test_sensed_upwind_damps_overshoots(reference):
     assert overshoot(es.Upwind(sensor=DimensionlessSensor(X=250.0))) < 0.25 * overshoot(es.Upwind())
 
 
+@pytest.mark.parametrize(("dim", "real"), [(2, wp.float32), (3, wp.float64)])
+def test_limiter_in_more_dimensions_keeps_momentum(dim, real):
+    x, volume = cloud(dim, 4, jitter=0.1)
+    velocity = np.where(x > 0.5, 1.0, -1.0) + np.arange(dim)
+    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=velocity)
+    scheme = es.LaxWendroff(
+        smoothing=es.NeighbourAverage(Linear()), limiter=FluxCorrectedTransport(DimensionlessSensor(X=5.0))
+    )
+    simulation = es.Simulation(body, scheme=scheme, reference=es.Never(), dtype=real)
+    mass = simulation.particles.mass.numpy().astype(float)
+    before = mass @ simulation.v
+    for _ in range(4):
+        simulation.clock.aim(1.0)
+        simulation.stepper.step()
+    precision = 1e-5 if real is wp.float32 else 1e-12
+    assert np.abs(mass @ simulation.v - before).max() < precision * mass.sum() * np.abs(velocity).max()
+    ledger = simulation.stepper.ledger
+    assert abs(ledger.residual(simulation.stepper.U)) < precision * ledger.start
+    assert ledger.accounts()["limiter"] < -1e-3 * ledger.start
+
+
 def test_gain_must_be_a_number():
     with pytest.raises(ValueError, match="sensor X must be finite and at least 0, got -1"):
         PaperSensor(X=-1.0)

@@ -11,33 +11,47 @@ Build bodies, state conditions, run::
 
 from .boundaries import Boundary, Fixed, Region, Velocity
 from .materials import Material, NeoHookean
+from .operators.values import Linear, Shepard
 from .scheme.dissipation import Upwind
 from .scheme.health import UnstableError
+from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff
+from .scheme.limiter import FluxCorrectedTransport
 from .scheme.pair_areas import PairAreas
 from .scheme.reference import Always, Every, Never, ReferencePolicy, WhenDistorted
-from .scheme.smoothing import LinearExact, Smoothing
+from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
+from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.time_step import TimeStep
 from .simulation import Body, Simulation
 from .space import Space
-from .weights import CubicSpline, Weight
+from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, WendlandC2, WendlandC4, WendlandC6
 
 __all__ = [
     "Always",
     "Body",
     "Boundary",
     "CubicSpline",
+    "DimensionlessSensor",
     "Every",
     "Fixed",
+    "FluxCorrectedTransport",
+    "Lax",
     "LaxWendroff",
+    "Linear",
     "LinearExact",
     "Material",
+    "NeighbourAverage",
     "NeoHookean",
     "Never",
     "PairAreas",
+    "PaperSensor",
+    "QuarticSpline",
+    "QuinticSpline",
     "ReferencePolicy",
     "Region",
+    "Sensor",
+    "Shepard",
     "Simulation",
     "Smoothing",
     "Space",
@@ -47,5 +61,8 @@ __all__ = [
     "Upwind",
     "Velocity",
     "Weight",
+    "WendlandC2",
+    "WendlandC4",
+    "WendlandC6",
     "WhenDistorted",
 ]

@@ -20,8 +20,8 @@ class Lax:
     """U^{n+1} = S(Uⁿ) + Δt (rates of Uⁿ): every step smooths, so that it damps strongly, more so the smaller Δt is.
 
     Args:
-        smoothing: S of the step; NeighbourAverage() is the paper's. LinearExact() is too weak here: it leaves long waves
-            alone, and those grow in an explicit Euler step.
+        smoothing: S of the step; NeighbourAverage() is the paper's. LinearExact() is too weak here: it leaves long
+            waves alone, and those grow in an explicit Euler step.
         dissipation: M9; None is the paper's scheme, whose S damps all but the saw-tooth.
         correction: what makes a moving reference stable, as in LaxWendroff.
     """
