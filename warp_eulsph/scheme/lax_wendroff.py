@@ -176,7 +176,7 @@ class LaxWendroffStepper:
         self._refresh_if_due(U)  # k = 0, every few steps, or n
         self._choose_dt(U)
         self._gradients(U)  # M4: ∇_k v, ∇_k F
-        self._sense(U)  # §5: d, and the diffusion of Uⁿ
+        self._sense(U)  # §5: d of vⁿ for both half steps, and the diffusion of Uⁿ
         self._stress(U)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, 0.0)  # M5, M9, M11, M12
         self._smooth(U, half)  # M6 or M7: S(U)
