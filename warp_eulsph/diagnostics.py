@@ -26,7 +26,7 @@ def _make_momenta(space: Space) -> Any:
         p = wp.vec3d()
         for i in range(wp.static(dim)):
             x[i] = wp.float64(state.x[a][i])
-            p[i] = wp.float64(particles.mass[a]) * wp.float64(state.v[a][i])
+            p[i] = wp.float64(particles.share[a] * particles.mass[a]) * wp.float64(state.v[a][i])
         L = wp.cross(x, p)
         out[a] = _Vec6(p[0], p[1], p[2], L[0], L[1], L[2])
 

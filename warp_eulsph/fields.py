@@ -26,6 +26,7 @@ PARTICLES = {
     "V0": Field("real", "m^d", "initial volume"),
     "h": Field("real", "m", "smoothing length, dilation times spacing"),
     "spacing": Field("real", "m", "initial particle spacing"),
+    "share": Field("real", "-", "1; 0 for ghosts, which energies and momenta leave out"),
     "body": Field("int", "-", "number of the body; only particles of one body are neighbours"),
 }
 STATE = {
@@ -55,6 +56,7 @@ FORCES = {
     "correction": Field("vec", "N", "force of the closed pair areas (M10, M11, M12)"),
     "dissipation": Field("vec", "N", "upwind dissipation (M9)"),
     "external": Field("vec", "N", "body forces, tractions, pressures"),
+    "free_v": Field("vec", "m/s", "velocity at the end of the step before the conditions were imposed"),
     "reaction": Field("vec", "N", "force that the imposed velocities took, mean over the step"),
 }
 GROUPS = {"Particles": PARTICLES, "State": STATE, "Reference": REFERENCE, "Flux": FLUX, "Forces": FORCES}

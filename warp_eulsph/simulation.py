@@ -34,6 +34,9 @@ class Body:
         material: its law.
         spacing: initial particle spacing [m], a number or (n,); by default volume^(1/dim).
         velocity: initial velocities [m/s], a number, (dim,) or (n, dim).
+        surface: outward area vectors s_a [m^(dim−1)], (n, dim), or 0 for a periodic body without a surface; by default
+            the defect e_a of the initial arrangement, which on a disordered one is noise inside too. Given vectors make
+            M10, M11 and M12 work with a fixed reference as well; without them they are zero there.
         name: for boundary conditions and output.
 
     Raises:
@@ -45,6 +48,7 @@ class Body:
     material: Material
     spacing: Any = None
     velocity: Any = 0.0
+    surface: Any = None
     name: str = "body"
 
     def __post_init__(self) -> None:
@@ -57,6 +61,8 @@ class Body:
         spacing = self.volume ** (1.0 / x.shape[1]) if self.spacing is None else self.spacing
         object.__setattr__(self, "spacing", self._field("spacing", spacing, (len(x),), positive=True))
         object.__setattr__(self, "velocity", self._field("velocity", self.velocity, x.shape))
+        if self.surface is not None:
+            object.__setattr__(self, "surface", self._field("surface", self.surface, x.shape))
 
     def _field(self, name: str, given: Any, shape: tuple[int, ...], positive: bool = False) -> np.ndarray:
         values = np.asarray(given, dtype=float)
@@ -133,7 +139,15 @@ class Simulation:
         self.clock = DeviceClock(self.space, time_step, self.device)
         U = self._state(X)
         self.stepper = scheme.build(
-            self.space, U, self.particles, flux, configuration, reference, self.clock, self.conditions
+            self.space,
+            U,
+            self.particles,
+            flux,
+            configuration,
+            reference,
+            self.clock,
+            self.conditions,
+            self.bodies[0].surface is not None,
         )
         self._check_neighbourhoods(X)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
@@ -256,6 +270,7 @@ class Simulation:
         particles.V0.assign(volume)
         particles.h.assign(dilation * spacing)
         particles.spacing.assign(spacing)
+        particles.share.fill_(1.0)
         particles.body.assign(np.repeat(np.arange(len(counts)), counts))
         return particles
 
@@ -265,6 +280,8 @@ class Simulation:
         U.x.assign(X)
         U.v.assign(np.concatenate([body.velocity for body in self.bodies]))
         U.F.assign(np.broadcast_to(np.eye(dim), (n, dim, dim)))
+        if self.bodies[0].surface is not None:
+            U.surface.assign(np.concatenate([body.surface for body in self.bodies]))
         return U
 
     def _check_neighbourhoods(self, X: np.ndarray) -> None:
@@ -318,6 +335,9 @@ def _checked_bodies(bodies: list[Body]) -> list[Body]:
     names = [body.name for body in bodies]
     if len(set(names)) < len(names):
         raise ValueError(f"names of bodies must differ, got {names}; pass name=...")
+    given = [body.name for body in bodies if body.surface is not None]
+    if given and len(given) < len(bodies):
+        raise ValueError(f"surface must be given for all bodies or for none, got it for {given} of {names}")
     dims = {body.name: body.x.shape[1] for body in bodies}
     if len(set(dims.values())) > 1:
         raise ValueError(f"bodies must have the same dimension, got {dims}")

@@ -101,9 +101,15 @@ def mirror(
         )
     shift = 2.0 * distance[sources, None] * n
     fields = {name: np.concatenate([field, field[sources]]) for name, field in _fields(body)}
+    if body.surface is not None:
+        fields["surface"] = np.concatenate([body.surface, body.surface[sources] @ _reflection(n)])
     extended = replace(body, x=np.concatenate([body.x, body.x[sources] + shift]), **fields)
     ghosts = np.arange(len(body.x), len(extended.x))
     return extended, MirrorGhosts(body.name, sources, ghosts, p, n, image)
+
+
+def _reflection(n: np.ndarray) -> np.ndarray:
+    return np.eye(len(n)) - 2.0 * np.outer(n, n)
 
 
 def _fields(body: Any) -> list[tuple[str, np.ndarray]]:
@@ -154,6 +160,9 @@ class BoundMirrorGhosts(Bound):
         self._sources = wp.array(sources, dtype=wp.int32, device=self.device)
         self._ghosts = wp.array(self.indices, dtype=wp.int32, device=self.device)
         self._shifts = wp.array(shifts.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
+        share = assembly.particles.share.numpy().copy()
+        share[self.indices] = 0.0
+        assembly.particles.share.assign(share)
         self._plane = [self.space.vec(*condition.point), self.space.vec(*condition.normal)]
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:

@@ -59,14 +59,17 @@ def safe_ratio(space: Space) -> Any:
 
 @functools.cache
 def _make_advance(space: Space, start: bool) -> Any:
-    """Kernel: x and residual along the search direction (or the first residual), preconditioned residual."""
+    """Kernel: x and residual along the search direction (or the first residual), preconditioned residual.
+
+    At the start ``Ap`` becomes the scale of the right-hand side, r∘r/diagonal, which a warm start does not shrink.
+    """
     real, vec, dim = space.real, space.vec, space.dim
     roundoff = float(np.finfo(space.numpy).eps) ** 2
     ratio = safe_ratio(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def advance(
-        first: wp.array(dtype=vec),
+        scale: wp.array(dtype=vec),
         rz: wp.array(dtype=vec),
         pAp: wp.array(dtype=vec),
         diagonal: wp.array(dtype=real),
@@ -79,12 +82,16 @@ def _make_advance(space: Space, start: bool) -> Any:
     ):
         a = wp.tid()
         if wp.static(start):
+            rhs = r[a]
             r[a] = r[a] - Ap[a]
+            Ap[a] = vec()
+            if diagonal[a] > real(0.0):
+                Ap[a] = wp.cw_mul(rhs, rhs) / diagonal[a]
         else:
             alpha = ratio(rz[0], pAp[0])
             for i in range(wp.static(dim)):
                 # Below round-off the directions decay to the constants, on which the Laplacian is singular.
-                if rz[0][i] <= real(roundoff) * first[0][i]:
+                if rz[0][i] <= real(roundoff) * scale[0][i]:
                     alpha[i] = real(0.0)
             x[a] = x[a] + wp.cw_mul(alpha, p[a])
             r[a] = r[a] - wp.cw_mul(alpha, Ap[a])
@@ -126,15 +133,15 @@ class LaplacianSolver:
         self.psi, self.residual = vector(n), vector(n)
         self._p, self._Ap, self._z, self._product = vector(n), vector(n), vector(n), vector(n)
         self._diagonal = wp.zeros(n, dtype=space.real, device=device)
-        self._first, self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1), vector(1)
+        self._scale, self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1), vector(1)
         self._sum = Sum(space.vec, device)
 
     def solve(self, reference: Any, near: Any, iterations: int) -> None:
         """Improve ``psi`` for the right-hand side in ``residual``, which becomes the residual."""
         self._apply(reference, near, self.psi)
         self._advance(start=True)
-        self._sum(self._product, self._first)
-        wp.copy(self._rz, self._first)
+        self._sum(self._Ap, self._scale)  # of the right-hand side: what round-off is measured against
+        self._sum(self._product, self._rz)
         for _ in range(iterations):
             self._apply(reference, near, self._p)
             self._sum(self._product, self._pAp)
@@ -150,7 +157,7 @@ class LaplacianSolver:
 
     def _advance(self, start: bool) -> None:
         arguments = [
-            self._first,
+            self._scale,
             self._rz,
             self._pAp,
             self._diagonal,

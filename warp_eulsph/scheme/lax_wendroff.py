@@ -34,7 +34,7 @@ class LaxWendroff:
             LinearExact() allows CFL 0.8 in 2-D with a fixed reference, NeighbourAverage() is the paper's.
         dissipation: M9; None leaves zero-energy modes undamped.
         correction: what makes a moving reference stable (M10, M11, M12); None is the plain dual form, which pairs up.
-            Not used with a fixed reference, where it is zero.
+            Not used with a fixed reference, where it is zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
     """
 
@@ -135,6 +135,7 @@ class LaxWendroffStepper:
         policy: ReferencePolicy,
         clock: DeviceClock,
         conditions: Sequence[Bound],
+        surface_given: bool,
     ):
         n, device = len(U.x), flux.device
         self.options, self.space, self.device, self.n = options, space, device, n
@@ -148,7 +149,7 @@ class LaxWendroffStepper:
         self.grad_F = wp.zeros(needed, dtype=space.row_gradient(space.dim**2), device=device)
         self.steps = 0
         counts = [part.size for part in flux.parts]
-        if options.correction is None or policy.fixed:
+        if options.correction is None or (policy.fixed and not surface_given):
             self.stabiliser = UpwindForces(space, device)
         else:
             self.stabiliser = options.correction.build(space, particles, counts, device)
@@ -163,7 +164,8 @@ class LaxWendroffStepper:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
         self._impose(U, 0.0)
         configuration.refresh(U)
-        configuration.defect(self.half.surface, U.surface)  # s_a = e_a at the start (M10), when half.surface is 0
+        if not surface_given:
+            configuration.defect(self.half.surface, U.surface)  # s_a = e_a at the start (M10), when half.surface is 0
         for condition in conditions:
             condition.start(U)
         self._after_refresh()
@@ -261,7 +263,7 @@ class LaxWendroffStepper:
             self.ledger.close_limiter(U)
 
     def _release(self, U: Any) -> None:
-        wp.copy(self.forces.reaction, U.v)  # until the ledger turns it into a force
+        wp.copy(self.forces.free_v, U.v)
 
     def _impose(self, state: Any, fraction: float) -> None:
         for condition in self.conditions:

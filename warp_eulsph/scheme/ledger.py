@@ -59,7 +59,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
         mass = wide(particles.mass[a])
         v = precise(state.v[a])
         v_mean = wide(0.5) * (precise(v_old[a]) + v)
-        impulse = (v - precise(forces.reaction[a])) * mass
+        impulse = (v - precise(forces.free_v[a])) * mass
         internal = precise(forces.internal[a])
         strain_power = wide(reference.V[a]) * wp.ddot(precise_mat(Q[a]), precise_mat(grad_v[a]))
         stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
@@ -69,7 +69,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
             stepping -= dW_limited[a]
         if wp.static(smoothed):
             stepping += mass * wp.dot(precise(dv[a]), v_mean)
-        out[a] = _Entry(
+        out[a] = wide(particles.share[a]) * _Entry(
             dt * wp.dot(precise(forces.external[a]), v_mean),
             wp.dot(impulse, v_mean),
             dt * wp.dot(precise(forces.dissipation[a]), v_mean),
@@ -104,9 +104,22 @@ def _make_kinetic(space: Space) -> Any:
     def kinetic(particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
         a = wp.tid()
         v_a = precise(v[a])
-        out[a] = wp.float64(0.5) * wp.float64(particles.mass[a]) * wp.dot(v_a, v_a)
+        out[a] = wp.float64(0.5) * wp.float64(particles.share[a] * particles.mass[a]) * wp.dot(v_a, v_a)
 
     return kinetic
+
+
+@functools.cache
+def _make_own(space: Space) -> Any:
+    """Kernel: leave out what ghosts hold."""
+    Particles = structure(space, "Particles")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def own(particles: Particles, value: wp.array(dtype=wp.float64)):
+        a = wp.tid()
+        value[a] = value[a] * wp.float64(particles.share[a])
+
+    return own
 
 
 @functools.cache
@@ -188,6 +201,7 @@ class Ledger:
     def stored(self, U: Any) -> float:
         """Stored energy [J]; reads the device."""
         self.flux.energy(U.F, self._W)
+        wp.launch(_make_own(self.space), len(self._W), [self.particles, self._W], device=self.device)
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
