@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import warp as wp
 
 import warp_eulsph as es
 
@@ -105,6 +106,43 @@ def test_uniform_stress_acts_on_the_surface_vectors_only():
     assert closed < 1e-9
 
 
+@pytest.mark.parametrize("dtype", [wp.float32, wp.float64])
+def test_more_iterations_than_needed_do_no_harm(dtype):
+    """A warm start that is converged already leaves nothing to divide by: ψ must stay, not wander off."""
+    body = block(2, 8, spin)
+    scheme = es.LaxWendroff(correction=es.PairAreas(kappa=math.inf, iterations=150))
+    simulation = es.Simulation(body, scheme=scheme, dtype=dtype)
+    simulation.step(3)
+    stepper = simulation.stepper
+    settled = []
+    for _ in range(5):  # the same reference again: the same right-hand side, a converged first guess
+        stepper.stabiliser.refresh(stepper.configuration, stepper.U)
+        psi = stepper.stabiliser.solver.psi.numpy()
+        settled.append(psi - psi.mean(axis=0))
+    change = np.abs(settled[-1] - settled[0]).max() / np.abs(settled[0]).max()
+    assert change < 1e3 * np.finfo(simulation.space.numpy).eps  # round-off times the condition of the solve
+
+
+def test_ghosts_stay_out_of_the_books():
+    """Half a plate with mirror ghosts has half the energy and momentum of the whole, at rest and in motion."""
+    whole = block(2, 12, lambda x: np.c_[8.0 * x[:, 0], -3.0 + 0.0 * x[:, 1]])
+    left = whole.x[:, 0] < 0.0
+    half = es.Body(x=whole.x[left], volume=whole.volume[0], material=whole.material, velocity=whole.velocity[left])
+    depth = 4 * 1.3 / 12
+    half, ghosts = es.mirror(half, point=(0.0, 0.0), normal=(1.0, 0.0), depth=depth)
+    simulations = [
+        es.Simulation(whole, reference=es.Never(), time_step=es.TimeStep(fixed=1e-4)),
+        es.Simulation(half, boundaries=[ghosts], reference=es.Never(), time_step=es.TimeStep(fixed=1e-4)),
+    ]
+    for steps in (0, 20):
+        for simulation in simulations:
+            simulation.step(steps)
+        full, part = (simulation.energy() for simulation in simulations)
+        assert part["total"] == pytest.approx(0.5 * full["total"], rel=1e-12)
+        assert abs(part["residual"]) < 1e-12 * part["total"]
+        assert simulations[1].momentum()[1] == pytest.approx(0.5 * simulations[0].momentum()[1], rel=1e-12)
+
+
 @pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
 def test_rigid_motion_is_free(reference):
     """A translating body stays stress-free; a rotating one loses less than 1e-3 of its spin in a tenth of a turn."""
@@ -148,7 +186,7 @@ def test_steps_allocate_nothing():
     assert len(stepper.configuration.near.index) == count
 
 
-def standing_wave(dim, n, reference, jitter=0.0):
+def standing_wave(dim, n, reference, jitter=0.0, **options):
     """Relative L2 errors of v, F and P of the swinging plate / low-dispersion cube (linear, exact), extended
     periodically: (velocity, F − I, P)."""
     rho, E, nu, amplitude = 1100.0, 17e6, 0.3, 1e-6
@@ -168,8 +206,9 @@ def standing_wave(dim, n, reference, jitter=0.0):
             slope = np.pi / 2 * (cosine[:, j] if j == i else -sine[:, j])
             gradient[:, i, j] = A[i] * np.prod([slope if k == j else f for k, f in enumerate(factors)], axis=0)
     material = es.NeoHookean(density=rho, young=E, poisson=nu)
-    body = es.Body(x=x, volume=(4 / n) ** dim, material=material, velocity=amplitude * omega * u)
-    simulation = es.Simulation(body, reference=reference, periodic=(4.0,) * dim)
+    velocity = amplitude * omega * u
+    body = es.Body(x=x, volume=(4 / n) ** dim, material=material, velocity=velocity, surface=0.0 if jitter else None)
+    simulation = es.Simulation(body, reference=reference, periodic=(4.0,) * dim, scheme=es.LaxWendroff(**options))
     end = 0.4 * 2 * math.pi / omega
     simulation.run(end)
     simulation.stepper.flux.compute(simulation.stepper.U.F, simulation.stepper.configuration.fields)
@@ -187,8 +226,8 @@ def standing_wave(dim, n, reference, jitter=0.0):
     )
 
 
-def orders(dim, levels, reference):
-    errors = np.array([standing_wave(dim, n, reference) for n in levels])
+def orders(dim, levels, reference, **options):
+    errors = np.array([standing_wave(dim, n, reference, **options) for n in levels])
     return np.polyfit(np.log(levels), -np.log(errors), 1)[0], errors
 
 
@@ -198,6 +237,25 @@ def test_second_order_in_2d(reference):
     observed, errors = orders(2, [48, 64, 80, 112], reference)
     print(observed, errors)
     assert observed.min() >= 1.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
+def test_closed_pairs_restore_convergence_on_a_jittered_cloud(reference):
+    """10 % jitter: plain M5 stops converging, M11 with the true (no) surface keeps orders of about 1.8 and 1.4.
+
+    The limit M12 takes that back, because a smooth field dissipates less than the defect needs; docs/measurements.md.
+    """
+    options = {"jitter": 0.1, "correction": es.PairAreas(kappa=math.inf, iterations=20)}
+    closed, errors = orders(2, [24, 32, 48, 64], reference, **options)
+    print("M11", closed, errors)
+    limited, errors = orders(2, [24, 32, 48, 64], reference, jitter=0.1)
+    print("M12", limited, errors)
+    plain, errors = orders(2, [24, 32, 48, 64], reference, jitter=0.1, correction=None)
+    print("M5", plain, errors)
+    assert closed[0] >= 1.7
+    assert closed[1:].min() >= 1.2
+    assert plain[1:].min() < 0.5
 
 
 @pytest.mark.slow
