@@ -37,7 +37,7 @@ def random_state(dim, seed=7):
 
 @pytest.mark.parametrize("values", [Shepard(), Linear()], ids=repr)
 @pytest.mark.parametrize("conservative", [True, False], ids=["conservative", "printed"])
-@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("dim", [1, 2])
 def test_diffusion_is_that_of_the_mass_matrices(dim, conservative, values):
     v, F, d = random_state(dim)
     option = FluxCorrectedTransport(conservative=conservative, values=values)
@@ -215,9 +215,9 @@ def test_sensed_upwind_damps_overshoots(reference):
     assert overshoot(es.Upwind(sensor=DimensionlessSensor(X=250.0))) < 0.25 * overshoot(es.Upwind())
 
 
-@pytest.mark.parametrize(("dim", "real"), [(2, wp.float32), (3, wp.float64)])
-def test_limiter_in_more_dimensions_keeps_momentum(dim, real):
-    x, volume = cloud(dim, 4, jitter=0.1)
+@pytest.mark.parametrize(("dim", "real"), [(1, wp.float32), (3, wp.float64)])
+def test_limiter_keeps_momentum_in_single_precision_and_in_three_dimensions(dim, real):
+    x, volume = cloud(dim, 4 if dim == 3 else 12, jitter=0.1)
     velocity = np.where(x > 0.5, 1.0, -1.0) + np.arange(dim)
     body = es.Body(x=x, volume=volume, material=RUBBER, velocity=velocity)
     scheme = es.LaxWendroff(
