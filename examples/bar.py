@@ -17,15 +17,12 @@ import warp as wp
 from bar_exact import DENSITY, LENGTH, SPEED, WAVE_SPEED, YOUNG, bar_exact
 
 import warp_eulsph as es
-from warp_eulsph.materials import Bar
 from warp_eulsph.output import Figure, SnapshotWriter, table
-from warp_eulsph.scheme.limiter import FluxCorrectedTransport
-from warp_eulsph.scheme.sensor import DimensionlessSensor
 
 END_TIME = 5e-4
 AMPLITUDE = SPEED * 0.25 * LENGTH / WAVE_SPEED  # of the end displacement [m]
 FRAMES = 500
-LIMITED = es.LaxWendroff(limiter=FluxCorrectedTransport(sensor=DimensionlessSensor()))
+LIMITED = es.LaxWendroff(limiter=es.FluxCorrectedTransport(sensor=es.DimensionlessSensor()))
 RUNS = {
     "total Lagrangian": (es.Never(), es.LaxWendroff()),
     "Eulerian": (es.Always(), es.LaxWendroff()),
@@ -48,7 +45,7 @@ def build(n: int, reference: es.ReferencePolicy, scheme: es.LaxWendroff) -> es.S
         x=x[:, None],
         volume=volume,
         spacing=dx,
-        material=Bar(density=DENSITY, young=YOUNG),
+        material=es.Bar(density=DENSITY, young=YOUNG),
         velocity=SPEED * moving[:, None],
     )
     return es.Simulation(body, boundaries=[es.Fixed([0])], reference=reference, scheme=scheme, dilation=1.0)

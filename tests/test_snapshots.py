@@ -10,7 +10,6 @@ import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-from warp_eulsph.materials import Bar
 from warp_eulsph.output import FIELDS, SnapshotWriter, read_snapshot, write_snapshot
 
 DENSITY, YOUNG, POISSON = 1100.0, 17e6, 0.3
@@ -92,7 +91,7 @@ def test_derived_fields_against_the_law_written_by_hand(simulation, tmp_path):
 
 def test_bar_has_uniaxial_stress(tmp_path):
     x, volume = box((0.0,), (1.0,), 0.05)
-    bar = es.Body(x=x, volume=volume, material=Bar(density=7833.0, young=2e11), velocity=x)
+    bar = es.Body(x=x, volume=volume, material=es.Bar(density=7833.0, young=2e11), velocity=x)
     simulation = es.Simulation(bar)
     simulation.run(until=2e-5)
     write_snapshot(tmp_path / "a.vtkhdf", simulation, ["cauchy_stress"], dtype=np.float64)

@@ -59,6 +59,12 @@ FIELDS = {
     "body": SnapshotField(
         lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, lambda f: f.simulation.particles.body.numpy()
     ),
+    "share": SnapshotField(
+        lambda d: (),
+        PARTICLES["share"].unit,
+        PARTICLES["share"].meaning,
+        lambda f: f.simulation.particles.share.numpy(),
+    ),
 }
 
 
