@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from warp_eulsph.output import read_snapshot
+from warp_eulsph.output import Figure, read_snapshot, table
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -88,3 +88,16 @@ def test_failed_check_ends_the_example(run):
     """Six particles along the block's side are too few for the reaction at 15 ms."""
     with pytest.raises(SystemExit, match=r"outside the accepted band: \['reaction at 15 ms"):
         run("punch", "-n", "6")
+
+
+def test_table_of_figures():
+    figures = [
+        Figure("inside", 1.5, 1.0, 2.0, 1.6),
+        Figure("outside", 2.5, 1.0, 2.0),
+        Figure("not a number", float("nan"), high=2.0),
+        Figure("free", -7.0),
+    ]
+    assert [figure.accepted for figure in figures] == [True, False, False, True]
+    lines = table(figures).splitlines()
+    assert [line.split()[-1] for line in lines[1:]] == ["ok", "OUTSIDE", "OUTSIDE", "ok"]
+    assert lines[1].split() == ["inside", "1.5", "1.6", "1", "to", "2", "ok"]
