@@ -67,10 +67,12 @@ def figures(name: str, n: int, history: dict[str, np.ndarray], residual: float) 
     energy = history["energy"] / history["energy"][0]
     error = np.sqrt(np.mean((history["u"] - history["u_exact"]) ** 2)) / AMPLITUDE
     overshoot = np.abs(history["u"]).max() / AMPLITUDE - 1.0
+    velocity_overshoot = np.abs(history["v"]).max() / SPEED - 1.0
     limited = "limiter" in name
     return [
         Figure(f"{name}: rms displacement error / amplitude", error, 0.0, 0.2 if limited else 0.14 * 40 / n, 0.0),
         Figure(f"{name}: overshoot / amplitude", overshoot, high=0.05 if limited else 0.3, reference=0.0),
+        Figure(f"{name}: velocity overshoot / 5 m/s", velocity_overshoot, reference=0.0),
         Figure(f"{name}: largest energy / first", energy.max(), 0.0, 1.0 + 1e-9, 1.0),
         Figure(f"{name}: energy kept", energy[-1], 0.0, 1.0, 1.0),
         Figure(f"{name}: ledger residual / energy", abs(residual) / history["energy"][0], 0.0, 1e-10, 0.0),
