@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warp_eulsph.geometry import box
+from warp_eulsph.geometry import box, nodes
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])
@@ -55,3 +55,19 @@ def test_errors_name_the_cause(arguments, message):
 def test_jitter_that_could_swap_particles_is_refused():
     with pytest.raises(ValueError, match="jitter must be in"):
         box((0,), (1,), 0.1, jitter=0.5)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_nodes_satisfy_the_divergence_theorem(dim):
+    lower, upper = [-1.0, 0.0, 2.0][:dim], [1.0, 3.0, 2.5][:dim]
+    x, volume, surface = nodes(lower, upper, 0.17)
+    assert x.min(axis=0).tolist() == lower
+    np.testing.assert_allclose(x.max(axis=0), upper, rtol=1e-15)
+    total = np.prod(np.subtract(upper, lower))
+    assert volume.sum() == pytest.approx(total, rel=1e-14)
+    np.testing.assert_allclose(surface.sum(axis=0), 0.0, atol=1e-14)
+    np.testing.assert_allclose(x.T @ surface, total * np.eye(dim), atol=1e-13)
+    inside = ((x > np.array(lower) + 1e-9) & (x < np.array(upper) - 1e-9)).all(axis=1)
+    assert not surface[inside].any()
+    with pytest.raises(ValueError, match="every axis must hold at least one cell"):
+        nodes(upper, lower, 0.1)

@@ -1,5 +1,5 @@
 """Shapes as particles."""
 
-from .lattice import box
+from .lattice import box, nodes
 
-__all__ = ["box"]
+__all__ = ["box", "nodes"]

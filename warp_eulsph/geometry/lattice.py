@@ -1,4 +1,4 @@
-"""Cell-centred lattices."""
+"""Lattices: particles at the centres of cells, or at their corners with exact surface vectors."""
 
 from collections.abc import Sequence
 
@@ -26,13 +26,50 @@ def box(
         ValueError: corners of unequal or wrong length, a spacing that leaves an axis without a cell, or a jitter out
             of range.
     """
+    if not 0.0 <= jitter < 0.5:
+        raise ValueError(f"jitter must be in [0, 0.5) spacings, got {jitter}; 0.1 is irregular already")
+    low, step, cells = _cells(lower, upper, spacing)
+    ranks = _grid([np.arange(n) for n in cells])
+    centres = ranks + 0.5
+    if jitter > 0.0:
+        centres = centres + np.random.default_rng(seed).uniform(-jitter, jitter, centres.shape)
+    return low + centres * step, float(np.prod(step))
+
+
+def nodes(lower: Sequence[float], upper: Sequence[float], spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Particles at the corners of equal cells that fill a box exactly: the outermost lie on its surface.
+
+    Volumes are those of the cells' shares, half at faces, a quarter at edges. The surface vectors satisfy the
+    divergence theorem with these positions, Σ s_a = 0 and Σ x_a ⊗ s_a = V I, so that M10 and M11 act on the true
+    surface (see ``Body.surface``).
+
+    Args:
+        lower: lower corner [m], (dim,).
+        upper: upper corner [m], (dim,).
+        spacing: wanted spacing [m], adjusted as in ``box``.
+
+    Returns:
+        Positions [m], (n, dim), the last axis fastest; volumes [m^dim], (n,); outward area vectors [m^(dim−1)],
+        (n, dim).
+
+    Raises:
+        ValueError: as ``box``.
+    """
+    low, step, cells = _cells(lower, upper, spacing)
+    ranks = _grid([np.arange(n + 1) for n in cells])
+    outward = (ranks == cells).astype(float) - (ranks == 0).astype(float)
+    shares = step * np.where(outward == 0.0, 1.0, 0.5)
+    volume = shares.prod(axis=1)
+    return low + ranks * step, volume, outward * (volume[:, None] / shares)
+
+
+def _cells(lower: Sequence[float], upper: Sequence[float], spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lower corner [m], cell lengths [m] and number of cells along each axis."""
     low, high = np.array(lower, dtype=float, ndmin=1), np.array(upper, dtype=float, ndmin=1)
     if low.shape != high.shape or low.ndim != 1 or low.size not in (1, 2, 3):
         raise ValueError(f"lower and upper must both have 1, 2 or 3 components, got {lower} and {upper}")
     if not (np.isfinite(spacing) and spacing > 0.0):
         raise ValueError(f"spacing must be positive and finite, got {spacing} m")
-    if not 0.0 <= jitter < 0.5:
-        raise ValueError(f"jitter must be in [0, 0.5) spacings, got {jitter}; 0.1 is irregular already")
     length = high - low
     cells = np.rint(length / spacing)
     if not np.isfinite(length).all() or (cells < 1).any():
@@ -41,9 +78,8 @@ def box(
             f"every axis must hold at least one cell, got length {length[axis]:.6g} m along axis {axis} at spacing "
             f"{spacing:.6g} m; order the corners or refine"
         )
-    step = length / cells
-    ranks = np.stack(np.meshgrid(*(np.arange(n) for n in cells.astype(int)), indexing="ij"), axis=-1)
-    centres = ranks.reshape(-1, low.size) + 0.5
-    if jitter > 0.0:
-        centres = centres + np.random.default_rng(seed).uniform(-jitter, jitter, centres.shape)
-    return low + centres * step, float(np.prod(step))
+    return low, length / cells, cells.astype(int)
+
+
+def _grid(axes: list[np.ndarray]) -> np.ndarray:
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
