@@ -139,6 +139,33 @@ def test_bodies_do_not_feel_each_other():
     assert np.array_equal(both.v[36:], np.zeros((25, 2)))
 
 
+def test_bodies_of_different_materials_run_together():
+    """Each body of a mixed run is that body alone, with its own law, wave speeds and energy, bit for bit."""
+    laws = [
+        RUBBER,
+        es.SaintVenantKirchhoff(density=2700.0, young=70e9, poisson=0.33),
+        es.TaitLiquid(density=1e3, sound_speed=1500.0),
+    ]
+    velocity = 4.0 * np.c_[square().x[:, 1], -(square().x[:, 0] ** 2)]
+    bodies = [square(material=law, name=str(i), velocity=velocity) for i, law in enumerate(laws)]
+    together = es.Simulation(bodies, time_step=es.TimeStep(fixed=1e-6))
+    together.step(10)
+    for i, body in enumerate(bodies):
+        alone = es.Simulation(body, time_step=es.TimeStep(fixed=1e-6))
+        alone.step(10)
+        assert np.array_equal(together.F[36 * i : 36 * (i + 1)], alone.F)
+    assert abs(together.energy()["residual"]) < 1e-12 * together.energy()["total"]
+
+
+def test_extrema_are_those_of_the_fields():
+    simulation = es.Simulation(square(velocity=[[3.0, 4.0]] + [[0.0, 0.0]] * 35))
+    assert simulation.extrema() == {"least J": 1.0, "largest J": 1.0, "speed": 5.0}
+    simulation.step(5)
+    J, speed = np.linalg.det(simulation.F), np.linalg.norm(simulation.v, axis=1)
+    expected = {"least J": J.min(), "largest J": J.max(), "speed": speed.max()}
+    assert simulation.extrema() == pytest.approx(expected, rel=1e-14)
+
+
 @pytest.mark.parametrize("dtype", [wp.float32, wp.float64])
 def test_runs_are_bit_reproducible(dtype):
     def final():

@@ -46,6 +46,22 @@ def _make_jacobian(space: Space) -> Any:
     return jacobian
 
 
+@functools.cache
+def _make_extrema(space: Space) -> Any:
+    """Kernel: least and largest det F, largest speed; minima and maxima do not depend on the order."""
+    State, determinant, real = structure(space, "State"), det(space), space.real
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_extrema(state: State, out: wp.array(dtype=real)):
+        a = wp.tid()
+        J = determinant(state.F[a])
+        wp.atomic_min(out, 0, J)
+        wp.atomic_max(out, 1, J)
+        wp.atomic_max(out, 2, wp.length(state.v[a]))
+
+    return find_extrema
+
+
 class Diagnostics:
     """Sums over all particles of a state, without allocation after construction."""
 
@@ -55,6 +71,7 @@ class Diagnostics:
         self._each = wp.zeros(n, dtype=_Vec6, device=device)
         self._total = wp.zeros(1, dtype=_Vec6, device=device)
         self._jacobian = wp.zeros(n, dtype=space.real, device=device)
+        self._extrema = wp.zeros(3, dtype=space.real, device=device)
         self._sum = Sum(_Vec6, device)
 
     def momenta(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -64,6 +81,13 @@ class Diagnostics:
         self._sum(self._each, self._total)
         total = self._total.numpy()[0].copy()
         return total[:3], total[3:]
+
+    def extrema(self, state: Any) -> tuple[float, float, float]:
+        """Least and largest det F [-], and largest speed [m/s]."""
+        self._extrema.assign([np.inf, -np.inf, 0.0])
+        wp.launch(_make_extrema(self.space), len(self._each), [state, self._extrema], device=self.device)
+        least, largest, speed = self._extrema.numpy().tolist()
+        return least, largest, speed
 
     def jacobians(self, state: Any) -> np.ndarray:
         """det F of each particle, (n,)."""

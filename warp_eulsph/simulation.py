@@ -234,6 +234,10 @@ class Simulation:
         """Volume ratios det F [-], (n,)."""
         return self.diagnostics.jacobians(self.stepper.U)
 
+    def extrema(self) -> dict[str, float]:
+        """Least and largest volume ratio det F [-] and largest speed [m/s], over all particles."""
+        return dict(zip(("least J", "largest J", "speed"), self.diagnostics.extrema(self.stepper.U), strict=True))
+
     def energy(self) -> dict[str, float]:
         """Energies [J]: kinetic, stored, total, what each mechanism added since the start, and the residual."""
         U, ledger = self.stepper.U, self.stepper.ledger

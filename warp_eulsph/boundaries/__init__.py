@@ -3,6 +3,7 @@
 from .base import Assembly, Bound, Boundary, Region
 from .body_force import BodyForce
 from .mirror import FreeEnd, MirrorGhosts, Wall, mirror
+from .motion import Motion
 from .pressure import Pressure
 from .roller import Roller
 from .traction import Traction
@@ -16,6 +17,7 @@ __all__ = [
     "Fixed",
     "FreeEnd",
     "MirrorGhosts",
+    "Motion",
     "Pressure",
     "Region",
     "Roller",

@@ -18,6 +18,7 @@ def _make_apply(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def apply_laplacian(
+        first: int,
         reference: Reference,
         near: Neighbours,
         f: wp.array(dtype=vec),
@@ -25,7 +26,7 @@ def _make_apply(space: Space) -> Any:
         diagonal: wp.array(dtype=real),
         product: wp.array(dtype=vec),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         f_a = f[a]
         total = vec()
         weights = real(0.0)
@@ -69,6 +70,7 @@ def _make_advance(space: Space, start: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def advance(
+        first: int,
         scale: wp.array(dtype=vec),
         rz: wp.array(dtype=vec),
         pAp: wp.array(dtype=vec),
@@ -80,7 +82,7 @@ def _make_advance(space: Space, start: bool) -> Any:
         z: wp.array(dtype=vec),
         product: wp.array(dtype=vec),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         if wp.static(start):
             rhs = r[a]
             r[a] = r[a] - Ap[a]
@@ -113,8 +115,10 @@ def _make_turn(space: Space) -> Any:
     ratio = safe_ratio(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def turn(rz: wp.array(dtype=vec), rz_old: wp.array(dtype=vec), z: wp.array(dtype=vec), p: wp.array(dtype=vec)):
-        a = wp.tid()
+    def turn(
+        first: int, rz: wp.array(dtype=vec), rz_old: wp.array(dtype=vec), z: wp.array(dtype=vec), p: wp.array(dtype=vec)
+    ):
+        a = first + wp.tid()
         p[a] = z[a] + wp.cw_mul(ratio(rz[0], rz_old[0]), p[a])
 
     return turn
@@ -136,36 +140,31 @@ class LaplacianSolver:
         self._scale, self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1), vector(1)
         self._sum = Sum(space.vec, device)
 
-    def solve(self, reference: Any, near: Any, iterations: int) -> None:
-        """Improve ``psi`` for the right-hand side in ``residual``, which becomes the residual."""
-        self._apply(reference, near, self.psi)
-        self._advance(start=True)
-        self._sum(self._Ap, self._scale)  # of the right-hand side: what round-off is measured against
-        self._sum(self._product, self._rz)
+    def solve(self, reference: Any, near: Any, body: range, iterations: int) -> None:
+        """Improve ``psi`` of one body's particles for the right-hand side in ``residual``, which becomes the residual.
+
+        Bodies are solved one by one: step lengths shared between them would let one feel the other.
+        """
+        own = slice(body.start, body.stop)
+        self._apply(reference, near, body, self.psi)
+        self._advance(body, start=True)
+        self._sum(self._Ap[own], self._scale)  # of the right-hand side: what round-off is measured against
+        self._sum(self._product[own], self._rz)
         for _ in range(iterations):
-            self._apply(reference, near, self._p)
-            self._sum(self._product, self._pAp)
-            self._advance(start=False)
+            self._apply(reference, near, body, self._p)
+            self._sum(self._product[own], self._pAp)
+            self._advance(body, start=False)
             self._rz, self._rz_old = self._rz_old, self._rz
-            self._sum(self._product, self._rz)
-            turn = [self._rz, self._rz_old, self._z, self._p]
-            wp.launch(_make_turn(self.space), len(self.psi), turn, device=self.device)
+            self._sum(self._product[own], self._rz)
+            turn = [body.start, self._rz, self._rz_old, self._z, self._p]
+            wp.launch(_make_turn(self.space), len(body), turn, device=self.device)
 
-    def _apply(self, reference: Any, near: Any, f: wp.array) -> None:
-        arguments = [reference, near, f, self._Ap, self._diagonal, self._product]
-        wp.launch(_make_apply(self.space), len(f), arguments, device=self.device)
+    def _apply(self, reference: Any, near: Any, body: range, f: wp.array) -> None:
+        arguments = [body.start, reference, near, f, self._Ap, self._diagonal, self._product]
+        wp.launch(_make_apply(self.space), len(body), arguments, device=self.device)
 
-    def _advance(self, start: bool) -> None:
-        arguments = [
-            self._scale,
-            self._rz,
-            self._pAp,
-            self._diagonal,
-            self._Ap,
-            self._p,
-            self.psi,
-            self.residual,
-            self._z,
-            self._product,
-        ]
-        wp.launch(_make_advance(self.space, start), len(self.psi), arguments, device=self.device)
+    def _advance(self, body: range, start: bool) -> None:
+        scalars = [self._scale, self._rz, self._pAp]
+        vectors = [self._Ap, self._p, self.psi, self.residual, self._z, self._product]
+        arguments = [body.start, *scalars, self._diagonal, *vectors]
+        wp.launch(_make_advance(self.space, start), len(body), arguments, device=self.device)

@@ -130,17 +130,18 @@ class ClosedPairs:
         self.option, self.space, self.device = option, space, device
         self.solver = LaplacianSolver(space, len(particles.mass), device)
         firsts = [sum(counts[:i]) for i in range(len(counts))]
-        self.bodies = list(zip(firsts, counts, strict=True))
+        self.bodies = [range(first, first + count) for first, count in zip(firsts, counts, strict=True)]
         self._sum, self._total = Sum(space.vec, device), wp.zeros(1, dtype=space.vec, device=device)
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Solve for the potentials ψ of the new reference, body by body free of a mean (M11)."""
         defect = self.solver.residual
         configuration.defect(state.surface, defect)
-        for first, count in self.bodies:
-            self._sum(defect[first : first + count], self._total)
-            wp.launch(_make_remove_mean(self.space), count, [first, count, self._total, defect], device=self.device)
-        self.solver.solve(configuration.fields, configuration.near, self.option.iterations)
+        for body in self.bodies:
+            self._sum(defect[body.start : body.stop], self._total)
+            arguments = [body.start, len(body), self._total, defect]
+            wp.launch(_make_remove_mean(self.space), len(body), arguments, device=self.device)
+            self.solver.solve(configuration.fields, configuration.near, body, self.option.iterations)
 
     def compute(
         self,
