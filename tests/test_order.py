@@ -1,4 +1,4 @@
-"""Order of convergence on exact standing waves: swinging plate (2-D) and low-dispersion cube (3-D), BENCHMARKS §5."""
+"""Order of convergence on exact standing waves: swinging plate (2-D) and low-dispersion cube (3-D)."""
 
 import math
 
