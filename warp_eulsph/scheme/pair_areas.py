@@ -20,8 +20,8 @@ class PairAreas:
     """Force correction that makes a moving reference stable (M11, M12); momentum stays exact.
 
     Args:
-        kappa: each pair's correction may feed at most ``kappa`` times what M9 dissipates in that pair (M12); 1 keeps
-            energy from growing, ``math.inf`` is M11 without a limit.
+        kappa: around each particle the correction may feed what it takes there plus ``kappa`` times what M9 dissipates
+            (M12); 1 keeps energy from growing, ``math.inf`` is M11 without a limit.
         iterations: conjugate-gradient iterations per refresh, warm-started.
     """
 
@@ -58,32 +58,32 @@ def _make_remove_mean(space: Space) -> Any:
 
 @functools.cache
 def admitted(space: Space) -> Any:
-    """``wp.func`` φ_ab of M12: 1 if the pair's correction takes energy, else κ δ / p capped at 1.
+    """``wp.func`` R_a of M12: the share of what it is fed that a particle can pay for, in [0, 1].
 
-    Args (of the function): κ, power p fed by the correction, power δ taken by the dissipation [W].
+    Args (of the function): powers [W] that the correction feeds and takes in the particle's pairs, power that the
+    dissipation takes there, κ.
     """
     real = space.real
 
     @wp.func
-    def admitted(kappa: real, p: real, delta: real) -> real:
-        phi = real(1.0)
-        if p > real(0.0):
-            phi = wp.min(real(1.0), kappa * wp.max(delta, real(0.0)) / p)
-        return phi
+    def admitted(fed: real, taken: real, dissipated: real, kappa: real) -> real:
+        share = real(1.0)
+        if fed > real(0.0):
+            share = wp.clamp((taken + kappa * dissipated) / fed, real(0.0), real(1.0))
+        return share
 
     return admitted
 
 
 @functools.cache
-def _make_forces(space: Space, limited: bool, sensed: bool) -> Any:
-    """Kernel: M9 and the correction ½ Σ_b φ_ab (Q_a + Q_b) c_ab of M11 and M12 in one walk of the rows."""
+def _make_dissipate(space: Space, sensed: bool) -> Any:
+    """Kernel: M9, and from the powers of M9 and of M11 in the particle's pairs what M12 admits, R_a."""
     real, vec, mat = space.real, space.vec, space.mat
-    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
-    Neighbours, Forces = neighbour_structure(space), structure(space, "Forces")
+    Reference, Flux, Neighbours = structure(space, "Reference"), structure(space, "Flux"), neighbour_structure(space)
     separation, pair_force, mix, share = difference(space), upwind(space), blend(space), admitted(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def dissipate_and_correct(
+    def dissipate_and_budget(
         reference: Reference,
         near: Neighbours,
         flux: Flux,
@@ -93,18 +93,20 @@ def _make_forces(space: Space, limited: bool, sensed: bool) -> Any:
         sensor: wp.array(dtype=vec),
         psi: wp.array(dtype=vec),
         kappa: real,
-        forces: Forces,
+        out: wp.array(dtype=vec),
+        admission: wp.array(dtype=real),
     ):
         a = wp.tid()
         x_a, V_a, v_a, grad_a = reference.x[a], reference.V[a], v[a], grad_v[a]
         Z_a, Z_shear_a, Q_a, psi_a = flux.impedance[a], flux.shear_impedance[a], flux.Q[a], psi[a]
         dissipation = vec()
-        correction = vec()
+        fed = real(0.0)
+        taken = real(0.0)
+        dissipated = real(0.0)
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
-            V_b = reference.V[b]
             xi = separation(reference.x[b], x_a, near.box)
-            VVg = V_a * V_b * near.g[k]
+            VVg = V_a * reference.V[b] * near.g[k]
             plain = v[b] - v_a
             jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
             if wp.static(sensed):
@@ -112,15 +114,45 @@ def _make_forces(space: Space, limited: bool, sensed: bool) -> Any:
             else:
                 jump = jump * epsilon
             upwind_ab = pair_force(xi, VVg, Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b], jump)
-            f_ab = (Q_a + flux.Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * VVg))
-            if wp.static(limited):
-                f_ab = f_ab * share(kappa, -wp.dot(f_ab, plain), wp.dot(upwind_ab, plain))
             dissipation += upwind_ab
-            correction += f_ab
-        forces.dissipation[a] = dissipation
-        forces.correction[a] = correction
+            dissipated += wp.dot(upwind_ab, plain)
+            p_ab = -wp.dot((Q_a + flux.Q[b]) @ (psi_a - psi[b]), plain) * real(0.5) * VVg
+            fed += wp.max(p_ab, real(0.0))
+            taken += wp.max(-p_ab, real(0.0))
+        out[a] = dissipation
+        admission[a] = share(fed, taken, dissipated, kappa)
 
-    return dissipate_and_correct
+    return dissipate_and_budget
+
+
+@functools.cache
+def _make_correct(space: Space, limited: bool) -> Any:
+    """Kernel: the correction ½ Σ_b φ_ab (Q_a + Q_b) c_ab (M11), feeding pairs by φ_ab = min(R_a, R_b) only (M12)."""
+    real, vec, mat = space.real, space.vec, space.mat
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def correct(
+        reference: Reference,
+        near: Neighbours,
+        Q: wp.array(dtype=mat),
+        v: wp.array(dtype=vec),
+        psi: wp.array(dtype=vec),
+        admission: wp.array(dtype=real),
+        out: wp.array(dtype=vec),
+    ):
+        a = wp.tid()
+        V_a, v_a, Q_a, psi_a = reference.V[a], v[a], Q[a], psi[a]
+        correction = vec()
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            f_ab = (Q_a + Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * V_a * reference.V[b] * near.g[k]))
+            if wp.static(limited) and wp.dot(f_ab, v[b] - v_a) < real(0.0):
+                f_ab = f_ab * wp.min(admission[a], admission[b])
+            correction += f_ab
+        out[a] = correction
+
+    return correct
 
 
 class ClosedPairs:
@@ -131,6 +163,7 @@ class ClosedPairs:
         self.solver = LaplacianSolver(space, len(particles.mass), device)
         firsts = [sum(counts[:i]) for i in range(len(counts))]
         self.bodies = [range(first, first + count) for first, count in zip(firsts, counts, strict=True)]
+        self.admission = wp.zeros(len(particles.mass), dtype=space.real, device=device)
         self._sum, self._total = Sum(space.vec, device), wp.zeros(1, dtype=space.vec, device=device)
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
@@ -154,8 +187,10 @@ class ClosedPairs:
         forces: Any,
     ) -> None:
         """Dissipation (M9) and correction (M11, M12) into ``forces``."""
-        kernel = _make_forces(self.space, self.option.limited, sensor is not None)
         kappa = self.option.kappa if self.option.limited else 0.0
         arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
-        arguments += [sensor if sensor is not None else v, self.solver.psi, kappa, forces]
-        wp.launch(kernel, len(v), arguments, device=self.device)
+        arguments += [sensor if sensor is not None else v, self.solver.psi, kappa, forces.dissipation, self.admission]
+        wp.launch(_make_dissipate(self.space, sensor is not None), len(v), arguments, device=self.device)
+        arguments = [configuration.fields, configuration.near, flux.Q, v, self.solver.psi, self.admission]
+        arguments += [forces.correction]
+        wp.launch(_make_correct(self.space, self.option.limited), len(v), arguments, device=self.device)
