@@ -10,6 +10,7 @@ from ..fields import neighbour_structure, structure
 from ..space import Space, difference
 from .reference import Configuration
 from .sensor import Sensor
+from .stabiliser import Stabiliser
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
     return dissipate
 
 
-class UpwindForces:
+class UpwindForces(Stabiliser):
     """M9 alone, for references that need no correction."""
 
     def __init__(self, space: Space, device: Any):
@@ -126,7 +127,7 @@ class UpwindForces:
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
-        sensor: Any,
+        sensor: wp.array | None,
         forces: Any,
     ) -> None:
         """Dissipation (M9) into ``forces.dissipation``."""

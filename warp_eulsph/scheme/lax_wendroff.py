@@ -22,6 +22,7 @@ from .pair_areas import PairAreas
 from .reference import Configuration, ReferencePolicy
 from .sensor import SensorField
 from .smoothing import Smoothing
+from .stabiliser import Stabiliser
 from .time_step import DeviceClock
 
 
@@ -149,9 +150,8 @@ class LaxWendroffStepper:
         self.grad_F = wp.zeros(needed, dtype=space.row_gradient(space.dim**2), device=device)
         self.steps = 0
         counts = [part.size for part in flux.parts]
-        if options.correction is None or (policy.fixed and not surface_given):
-            self.stabiliser = UpwindForces(space, device)
-        else:
+        self.stabiliser: Stabiliser = UpwindForces(space, device)
+        if options.correction is not None and (surface_given or not policy.fixed):
             self.stabiliser = options.correction.build(space, particles, counts, device)
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:

@@ -13,6 +13,7 @@ from ..reduce import Sum
 from ..space import Space, difference
 from .dissipation import blend, upwind
 from .reference import Configuration
+from .stabiliser import Stabiliser
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def _make_correct(space: Space, limited: bool) -> Any:
     return correct
 
 
-class ClosedPairs:
+class ClosedPairs(Stabiliser):
     """The pair areas c_ab = ω_ab (ψ_a − ψ_b) of the present reference, and the forces they correct."""
 
     def __init__(self, option: PairAreas, space: Space, particles: Any, counts: list[int], device: Any):
@@ -183,7 +184,7 @@ class ClosedPairs:
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
-        sensor: Any,
+        sensor: wp.array | None,
         forces: Any,
     ) -> None:
         """Dissipation (M9) and correction (M11, M12) into ``forces``."""

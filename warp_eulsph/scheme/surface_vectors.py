@@ -11,6 +11,7 @@ from ..reduce import Sum
 from ..space import Space
 from .dissipation import UpwindForces
 from .reference import Configuration
+from .stabiliser import Stabiliser
 
 # Sums of one body about the origin, padded to 3-D: force, torque, m x, m, inertia (xx, yy, zz, xy, yz, zx).
 _Sums = wp.types.vector(length=16, dtype=wp.float64)
@@ -110,7 +111,7 @@ def _make_project(space: Space) -> Any:
     return project
 
 
-class SurfaceForces:
+class SurfaceForces(Stabiliser):
     """M9 and M10 at work."""
 
     def __init__(self, option: SurfaceVectors, space: Space, particles: Any, counts: list[int], device: Any):
@@ -133,7 +134,7 @@ class SurfaceForces:
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
-        sensor: Any,
+        sensor: wp.array | None,
         forces: Any,
     ) -> None:
         """Dissipation (M9) and correction (M10) into ``forces``."""
