@@ -1,0 +1,29 @@
+"""What keeps the sums of a reference stable: dissipation, and the correction of what the arrangement gets wrong."""
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import warp as wp
+
+from .reference import Configuration
+
+
+class Stabiliser(ABC):
+    """The stabilising forces at work on one set of particles."""
+
+    @abstractmethod
+    def refresh(self, configuration: Configuration, state: Any) -> None:
+        """Prepare for a new reference."""
+
+    @abstractmethod
+    def compute(
+        self,
+        configuration: Configuration,
+        flux: Any,
+        v: wp.array,
+        grad_v: wp.array,
+        epsilon: float,
+        sensor: wp.array | None,
+        forces: Any,
+    ) -> None:
+        """Dissipation (M9, share ``epsilon``, switched by ``sensor``) and correction [N] into ``forces``."""
