@@ -120,7 +120,7 @@ def test_second_order_in_3d(reference):
 def test_closed_pairs_restore_convergence_on_a_jittered_cloud(reference):
     """10 % jitter: M5 stops converging, M11 with the true (no) surface does not.
 
-    The limit M12 takes that back, because a smooth field dissipates less than the defect needs; docs/measurements.md.
+    The limit M12 takes a part back, because a smooth field dissipates less than the defect needs; docs/measurements.md.
     """
     levels = [24, 32, 48, 64]
     plain = orders(periodic, levels, 2, reference, jitter=0.1, correction=None)
