@@ -11,7 +11,7 @@ import warp as wp
 from scipy.optimize import brentq
 
 import warp_eulsph as es
-from warp_eulsph.boundaries import BodyForce, FreeEnd, Pressure, Roller, Traction, Wall, mirror
+from warp_eulsph.boundaries import Antisymmetry, BodyForce, Pressure, Roller, Traction, Wall, mirror
 from warp_eulsph.materials import Bar
 from warp_eulsph.scheme.smoothing import NeighbourAverage
 
@@ -311,7 +311,7 @@ def test_bar_is_nodally_exact_at_courant_number_two():
     velocity = np.where(x > 0.75 * LENGTH, SPEED, 0.0)
     body = es.Body(x=x, volume=dx, material=Bar(density=DENSITY, young=YOUNG), velocity=velocity)
     body, fixed_end = mirror(body, point=[0.0], normal=[-1.0], depth=4 * dx)
-    body, free_end = mirror(body, point=[LENGTH], normal=[1.0], depth=4 * dx, image=FreeEnd())
+    body, free_end = mirror(body, point=[LENGTH], normal=[1.0], depth=4 * dx, image=Antisymmetry())
     assert len(body.x) == 48
     simulation = es.Simulation(
         body,
@@ -370,7 +370,7 @@ def test_errors(condition, message):
         ({"point": (0.05, 0.0)}, "in front of the plane and off it, got particle 0.*half a spacing"),
         ({"normal": (1.0, 0.0)}, "in front of the plane"),
         ({"depth": 0.01}, "no particle within depth 0.01 m of the plane, the nearest is 0.05 m away"),
-        ({"image": FreeEnd()}, "FreeEnd needs 1-D and a linear law such as Bar, got 2-D and NeoHookean"),
+        ({"image": Antisymmetry()}, "Antisymmetry needs a linear law such as Bar or LinearElastic, got NeoHookean"),
     ],
 )
 def test_mirror_errors(change, message):
@@ -380,5 +380,5 @@ def test_mirror_errors(change, message):
 
 def test_free_end_needs_a_linear_law():
     body = es.Body(x=lattice(8), volume=DX, material=RUBBER)
-    with pytest.raises(ValueError, match="got 1-D and NeoHookean"):
-        mirror(body, point=[0.0], normal=[-1.0], depth=0.5, image=FreeEnd())
+    with pytest.raises(ValueError, match="linear law such as Bar or LinearElastic, got NeoHookean"):
+        mirror(body, point=[0.0], normal=[-1.0], depth=0.5, image=Antisymmetry())

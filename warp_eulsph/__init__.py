@@ -10,10 +10,10 @@ Build bodies, state conditions, run::
 """
 
 from .boundaries import (
+    Antisymmetry,
     BodyForce,
     Boundary,
     Fixed,
-    FreeEnd,
     MirrorGhosts,
     Motion,
     Pressure,
@@ -53,6 +53,7 @@ from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, Wendland
 
 __all__ = [
     "Always",
+    "Antisymmetry",
     "Bar",
     "Body",
     "BodyForce",
@@ -62,7 +63,6 @@ __all__ = [
     "Every",
     "Fixed",
     "FluxCorrectedTransport",
-    "FreeEnd",
     "Lax",
     "LaxWendroff",
     "Linear",

@@ -2,7 +2,7 @@
 
 from .base import Assembly, Bound, Boundary, Region
 from .body_force import BodyForce
-from .mirror import FreeEnd, MirrorGhosts, Wall, mirror
+from .mirror import Antisymmetry, MirrorGhosts, Wall, mirror
 from .motion import Motion
 from .pressure import Pressure
 from .roller import Roller
@@ -10,12 +10,12 @@ from .traction import Traction
 from .velocity import Fixed, Velocity
 
 __all__ = [
+    "Antisymmetry",
     "Assembly",
     "BodyForce",
     "Bound",
     "Boundary",
     "Fixed",
-    "FreeEnd",
     "MirrorGhosts",
     "Motion",
     "Pressure",

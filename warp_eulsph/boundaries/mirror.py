@@ -15,23 +15,26 @@ from .base import Assembly, Bound, Boundary, unit_vector
 
 @dataclass(frozen=True)
 class Image:
-    """How a ghost copies its source; ``Wall`` or ``FreeEnd``."""
+    """How a ghost copies its source; ``Wall`` or ``Antisymmetry``."""
 
-    free: ClassVar[bool]
+    odd: ClassVar[bool]
 
 
 @dataclass(frozen=True)
 class Wall(Image):
     """Symmetry plane, frictionless wall, or fixed end in 1-D: v' = R v, F' = R F R with R = I − 2 n⊗n."""
 
-    free = False
+    odd = False
 
 
 @dataclass(frozen=True)
-class FreeEnd(Image):
-    """Free end of a linear bar, in 1-D: v' = v and F' = 2 − F, which turns the stress round."""
+class Antisymmetry(Image):
+    """Plane that holds tangential motion and bears no normal traction; the free end of a bar in 1-D. Linear laws only.
 
-    free = True
+    The displacement turns its sign with the reflection: u' = −R u, v' = −R v, F' − I = −R (F − I) R, and so the stress.
+    """
+
+    odd = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +47,7 @@ class MirrorGhosts(Boundary):
         ghosts: particles of the body that copy them, (k,).
         point: a point of the plane [m], (dim,).
         normal: unit normal of the plane, (dim,).
-        image: Wall() or FreeEnd().
+        image: Wall() or Antisymmetry().
     """
 
     body: str
@@ -72,19 +75,19 @@ def mirror(
         point: a point of the plane [m], (dim,).
         normal: normal of the plane, pointing out of the body, (dim,).
         depth: distance from the plane within which particles get a ghost [m].
-        image: Wall(), or FreeEnd() for a linear law in 1-D.
+        image: Wall(), or Antisymmetry() for a linear law.
 
     Raises:
-        ValueError: particles on or behind the plane, none within ``depth``, or FreeEnd where it does not hold.
+        ValueError: particles on or behind the plane, none within ``depth``, or Antisymmetry where the law is not linear.
     """
     dim = body.x.shape[1]
     n, p = unit_vector(normal, dim, "mirror"), np.asarray(point, dtype=float)
     if p.shape != (dim,) or not np.isfinite(p).all():
         raise ValueError(f"mirror: point must be ({dim},) finite numbers, got {point}")
-    if image.free and (dim != 1 or not body.material.linear):
+    if image.odd and not body.material.linear:
         raise ValueError(
-            f"mirror: FreeEnd needs 1-D and a linear law such as Bar, got {dim}-D and {type(body.material).__name__}; "
-            "a free surface needs no ghosts otherwise"
+            "mirror: Antisymmetry needs a linear law such as Bar or LinearElastic, got "
+            f"{type(body.material).__name__}; a free surface needs no ghosts otherwise"
         )
     distance = (p - body.x) @ n
     spacing = np.broadcast_to(body.spacing, len(body.x))
@@ -119,14 +122,14 @@ def _fields(body: Any) -> list[tuple[str, np.ndarray]]:
 
 
 @functools.cache
-def _make_reflect(space: Space, free: bool) -> Any:
+def _make_reflect(space: Space, odd: bool) -> Any:
     real, vec, State = space.real, space.vec, structure(space, "State")
 
     @wp.kernel(module="unique", enable_backward=False)
     def reflect(
         sources: wp.array(dtype=wp.int32),
         ghosts: wp.array(dtype=wp.int32),
-        shifts: wp.array(dtype=vec),
+        X: wp.array(dtype=vec),
         point: vec,
         normal: vec,
         state: State,
@@ -135,12 +138,12 @@ def _make_reflect(space: Space, free: bool) -> Any:
         a = sources[k]
         g = ghosts[k]
         unit = wp.identity(n=wp.static(space.dim), dtype=real)
-        if wp.static(free):
-            state.v[g] = state.v[a]
-            state.F[g] = unit * real(2.0) - state.F[a]
-            state.x[g] = state.x[a] + shifts[k]
+        R = unit - wp.outer(normal, normal) * real(2.0)
+        if wp.static(odd):
+            state.v[g] = -(R @ state.v[a])
+            state.F[g] = unit - R @ (state.F[a] - unit) @ R
+            state.x[g] = X[g] - R @ (state.x[a] - X[a])
         else:
-            R = unit - wp.outer(normal, normal) * real(2.0)
             state.v[g] = R @ state.v[a]
             state.F[g] = R @ state.F[a] @ R
             state.x[g] = point + R @ (state.x[a] - point)
@@ -156,15 +159,14 @@ class BoundMirrorGhosts(Bound):
         first = assembly.bodies[condition.body][0] if condition.body in assembly.bodies else 0
         self.indices = assembly.select(first + condition.ghosts, condition.body, "MirrorGhosts")
         sources = (first + condition.sources).astype(np.int32)
-        shifts = assembly.X[self.indices] - assembly.X[sources]
         self._sources = wp.array(sources, dtype=wp.int32, device=self.device)
         self._ghosts = wp.array(self.indices, dtype=wp.int32, device=self.device)
-        self._shifts = wp.array(shifts.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
+        self._X = wp.array(assembly.X.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
         share = assembly.particles.share.numpy().copy()
         share[self.indices] = 0.0
         assembly.particles.share.assign(share)
         self._plane = [self.space.vec(*condition.point), self.space.vec(*condition.normal)]
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
-        arguments = [self._sources, self._ghosts, self._shifts, *self._plane, state]
-        wp.launch(_make_reflect(self.space, self.image.free), len(self.indices), arguments, device=self.device)
+        arguments = [self._sources, self._ghosts, self._X, *self._plane, state]
+        wp.launch(_make_reflect(self.space, self.image.odd), len(self.indices), arguments, device=self.device)
