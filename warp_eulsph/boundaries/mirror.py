@@ -78,7 +78,7 @@ def mirror(
         image: Wall(), or Antisymmetry() for a linear law.
 
     Raises:
-        ValueError: particles on or behind the plane, none within ``depth``, or Antisymmetry where the law is not linear.
+        ValueError: particles on or behind the plane, none within ``depth``, or Antisymmetry without a linear law.
     """
     dim = body.x.shape[1]
     n, p = unit_vector(normal, dim, "mirror"), np.asarray(point, dtype=float)
