@@ -81,6 +81,28 @@ class Material(ABC):
         """Point functions in this space, cached: the same objects for the same space."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Isotropic(Material):
+    """A law with the two constants of isotropic linear elasticity at small strain.
+
+    Args:
+        density: initial density [kg/m³].
+        young: Young's modulus [Pa].
+        poisson: Poisson's ratio, in (−1, 0.5).
+    """
+
+    young: float
+    poisson: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        lame_constants(self.young, self.poisson)
+
+    def constants(self) -> dict[str, float]:
+        mu, kappa = lame_constants(self.young, self.poisson)
+        return {"mu": mu, "lam": kappa - 2.0 * mu / 3.0}
+
+
 def positive(name: str, value: float, unit: str) -> None:
     """Raise unless ``value`` is a finite positive number."""
     if not (math.isfinite(value) and value > 0.0):

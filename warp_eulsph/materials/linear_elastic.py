@@ -8,11 +8,11 @@ import warp as wp
 
 from ..linalg import symmetric_bounds
 from ..space import Space
-from .base import Law, Material, lame_constants
+from .base import Isotropic, Law
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearElastic(Material):
+class LinearElastic(Isotropic):
     """P = λ tr(ε) I + 2μ ε, ε = sym(F − I). Uniaxial strain in 1-D; for a bar in uniaxial stress take ``Bar``.
 
     Args:
@@ -21,17 +21,7 @@ class LinearElastic(Material):
         poisson: Poisson's ratio, in (−1, 0.5).
     """
 
-    young: float
-    poisson: float
     linear: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        lame_constants(self.young, self.poisson)
-
-    def constants(self) -> dict[str, float]:
-        mu, kappa = lame_constants(self.young, self.poisson)
-        return {"mu": mu, "lam": kappa - 2.0 * mu / 3.0}
 
     def law(self, space: Space) -> Law:
         return _law(space)

@@ -8,11 +8,11 @@ import warp as wp
 
 from ..linalg import cofactor, det, symmetric_bounds
 from ..space import Space
-from .base import Law, Material, lame_constants, largest_eigenvalue
+from .base import Isotropic, Law, lame_constants, largest_eigenvalue
 
 
 @dataclass(frozen=True, kw_only=True)
-class NeoHookean(Material):
+class NeoHookean(Isotropic):
     """Ψ = μ/2 (J^(−2/3) F:F − 3) + κ/2 (J − 1)², Bonet & Wood (2008).
 
     Args:
@@ -20,13 +20,6 @@ class NeoHookean(Material):
         young: Young's modulus [Pa].
         poisson: Poisson's ratio, in (−1, 0.5).
     """
-
-    young: float
-    poisson: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        lame_constants(self.young, self.poisson)
 
     def constants(self) -> dict[str, float]:
         mu, kappa = lame_constants(self.young, self.poisson)

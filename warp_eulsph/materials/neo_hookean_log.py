@@ -7,11 +7,11 @@ import warp as wp
 
 from ..linalg import det, inverse, symmetric_bounds
 from ..space import Space
-from .base import Law, Material, lame_constants
+from .base import Isotropic, Law
 
 
 @dataclass(frozen=True, kw_only=True)
-class NeoHookeanLog(Material):
+class NeoHookeanLog(Isotropic):
     """Ψ = μ/2 (F:F − 3) − μ ln J + λ/2 (ln J)², P = μ (F − F⁻ᵀ) + λ ln J F⁻ᵀ (Bonet & Wood, 2008, §6.4.3).
 
     Args:
@@ -19,17 +19,6 @@ class NeoHookeanLog(Material):
         young: Young's modulus [Pa].
         poisson: Poisson's ratio, in (−1, 0.5).
     """
-
-    young: float
-    poisson: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        lame_constants(self.young, self.poisson)
-
-    def constants(self) -> dict[str, float]:
-        mu, kappa = lame_constants(self.young, self.poisson)
-        return {"mu": mu, "lam": kappa - 2.0 * mu / 3.0}
 
     def law(self, space: Space) -> Law:
         return _law(space)

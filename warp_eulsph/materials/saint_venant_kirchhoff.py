@@ -7,11 +7,11 @@ import warp as wp
 
 from ..linalg import symmetric_bounds
 from ..space import Space
-from .base import Law, Material, lame_constants
+from .base import Isotropic, Law
 
 
 @dataclass(frozen=True, kw_only=True)
-class SaintVenantKirchhoff(Material):
+class SaintVenantKirchhoff(Isotropic):
     """P = F S, S = λ tr(E) I + 2μ E, E = ½ (FᵀF − I); large rotations, moderate strains (it softens in compression).
 
     Args:
@@ -19,17 +19,6 @@ class SaintVenantKirchhoff(Material):
         young: Young's modulus [Pa].
         poisson: Poisson's ratio, in (−1, 0.5).
     """
-
-    young: float
-    poisson: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        lame_constants(self.young, self.poisson)
-
-    def constants(self) -> dict[str, float]:
-        mu, kappa = lame_constants(self.young, self.poisson)
-        return {"mu": mu, "lam": kappa - 2.0 * mu / 3.0}
 
     def law(self, space: Space) -> Law:
         return _law(space)

@@ -144,6 +144,7 @@ class Flux:
         bodies: (material, number of particles) in the order of the particle arrays.
 
     Attributes:
+        bodies: particle indices of each body.
         histories: what the material of each body remembers, (particles of the body,) of ``Law.history`` reals, or None.
     """
 
@@ -160,6 +161,7 @@ class Flux:
             self.parts.append(_Part(first, count, law, constants, history))
             first += count
         self.fields = allocate(space, "Flux", first, device)
+        self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.histories = [part.history for part in self.parts]
 
     def compute(self, F: wp.array, reference: Any) -> None:

@@ -31,8 +31,8 @@ class LaxWendroff:
     """Options of the scheme; the defaults are the combination that held in every case measured (docs/method.md).
 
     Args:
-        smoothing: S of the half step; None is the identity (explicit midpoint), which never gained energy at CFL 0.4.
-            LinearExact() allows CFL 0.8 in 2-D with a fixed reference, NeighbourAverage() is the paper's.
+        smoothing: S of the half step; None is the identity (explicit midpoint), which never gained energy at CFL 0.4;
+            NeighbourAverage() is the paper's. Neither it nor LinearExact() is safe in bounded bodies.
         dissipation: M9; None leaves zero-energy modes undamped.
         correction: what makes a moving reference stable (M10, M11, M12); None is the plain dual form, which pairs up.
             Not used with a fixed reference, where it is zero unless the bodies came with surface vectors.
@@ -149,10 +149,9 @@ class LaxWendroffStepper:
         needed = n if smoothing is not None and smoothing.needs_gradient else 0
         self.grad_F = wp.zeros(needed, dtype=space.row_gradient(space.dim**2), device=device)
         self.steps = 0
-        counts = [part.size for part in flux.parts]
         self.stabiliser: Stabiliser = UpwindForces(space, device)
         if options.correction is not None and (surface_given or not policy.fixed):
-            self.stabiliser = options.correction.build(space, particles, counts, device)
+            self.stabiliser = options.correction.build(space, particles, flux.bodies, device)
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:
             self.limiter = options.limiter.build(space, particles, configuration, device)

@@ -11,7 +11,7 @@ from ..fields import neighbour_structure, structure
 from ..operators.laplacian import LaplacianSolver
 from ..reduce import Sum
 from ..space import Space, difference
-from .dissipation import blend, upwind
+from .dissipation import UpwindForces, blend, upwind
 from .reference import Configuration
 from .stabiliser import Stabiliser
 
@@ -40,9 +40,9 @@ class PairAreas:
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(self, space: Space, particles: Any, counts: list[int], device: Any) -> "ClosedPairs":
-        """Allocate for bodies of ``counts`` particles."""
-        return ClosedPairs(self, space, particles, counts, device)
+    def build(self, space: Space, particles: Any, bodies: list[range], device: Any) -> "ClosedPairs":
+        """Allocate for ``bodies``, each a range of particles."""
+        return ClosedPairs(self, space, particles, bodies, device)
 
 
 @functools.cache
@@ -159,11 +159,10 @@ def _make_correct(space: Space, limited: bool) -> Any:
 class ClosedPairs(Stabiliser):
     """The pair areas c_ab = ω_ab (ψ_a − ψ_b) of the present reference, and the forces they correct."""
 
-    def __init__(self, option: PairAreas, space: Space, particles: Any, counts: list[int], device: Any):
-        self.option, self.space, self.device = option, space, device
+    def __init__(self, option: PairAreas, space: Space, particles: Any, bodies: list[range], device: Any):
+        self.option, self.space, self.bodies, self.device = option, space, bodies, device
+        self.upwind = UpwindForces(space, device)
         self.solver = LaplacianSolver(space, len(particles.mass), device)
-        firsts = [sum(counts[:i]) for i in range(len(counts))]
-        self.bodies = [range(first, first + count) for first, count in zip(firsts, counts, strict=True)]
         self.admission = wp.zeros(len(particles.mass), dtype=space.real, device=device)
         self._sum, self._total = Sum(space.vec, device), wp.zeros(1, dtype=space.vec, device=device)
 
@@ -188,10 +187,13 @@ class ClosedPairs(Stabiliser):
         forces: Any,
     ) -> None:
         """Dissipation (M9) and correction (M11, M12) into ``forces``."""
-        kappa = self.option.kappa if self.option.limited else 0.0
-        arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
-        arguments += [sensor if sensor is not None else v, self.solver.psi, kappa, forces.dissipation, self.admission]
-        wp.launch(_make_dissipate(self.space, sensor is not None), len(v), arguments, device=self.device)
+        if self.option.limited:
+            arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
+            arguments += [sensor if sensor is not None else v, self.solver.psi, self.option.kappa]
+            arguments += [forces.dissipation, self.admission]
+            wp.launch(_make_dissipate(self.space, sensor is not None), len(v), arguments, device=self.device)
+        else:
+            self.upwind.compute(configuration, flux, v, grad_v, epsilon, sensor, forces)
         arguments = [configuration.fields, configuration.near, flux.Q, v, self.solver.psi, self.admission]
         arguments += [forces.correction]
         wp.launch(_make_correct(self.space, self.option.limited), len(v), arguments, device=self.device)

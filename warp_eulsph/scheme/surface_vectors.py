@@ -28,9 +28,9 @@ class SurfaceVectors:
 
     project: bool = False
 
-    def build(self, space: Space, particles: Any, counts: list[int], device: Any) -> "SurfaceForces":
-        """Allocate for bodies of ``counts`` particles."""
-        return SurfaceForces(self, space, particles, counts, device)
+    def build(self, space: Space, particles: Any, bodies: list[range], device: Any) -> "SurfaceForces":
+        """Allocate for ``bodies``, each a range of particles."""
+        return SurfaceForces(self, space, particles, bodies, device)
 
 
 @functools.cache
@@ -114,12 +114,11 @@ def _make_project(space: Space) -> Any:
 class SurfaceForces(Stabiliser):
     """M9 and M10 at work."""
 
-    def __init__(self, option: SurfaceVectors, space: Space, particles: Any, counts: list[int], device: Any):
+    def __init__(self, option: SurfaceVectors, space: Space, particles: Any, bodies: list[range], device: Any):
         n = len(particles.mass)
-        self.option, self.space, self.particles, self.device = option, space, particles, device
+        self.option, self.space, self.particles, self.bodies, self.device = option, space, particles, bodies, device
         self.upwind = UpwindForces(space, device)
         self.defect = wp.zeros(n, dtype=space.vec, device=device)
-        self.bodies = [(sum(counts[:i]), count) for i, count in enumerate(counts)]
         self._each = wp.zeros(n, dtype=_Sums, device=device)
         self._total, self._sum = wp.zeros(1, dtype=_Sums, device=device), Sum(_Sums, device)
 
@@ -142,7 +141,7 @@ class SurfaceForces(Stabiliser):
         arguments = [self.particles, configuration.fields, flux.Q, self.defect, forces, self._each]
         wp.launch(_make_correction(self.space), len(v), arguments, device=self.device)
         if self.option.project:
-            for first, count in self.bodies:
-                self._sum(self._each[first : first + count], self._total)
-                arguments = [first, self.particles, configuration.fields, self._total, forces]
-                wp.launch(_make_project(self.space), count, arguments, device=self.device)
+            for body in self.bodies:
+                self._sum(self._each[body.start : body.stop], self._total)
+                arguments = [body.start, self.particles, configuration.fields, self._total, forces]
+                wp.launch(_make_project(self.space), len(body), arguments, device=self.device)
