@@ -20,7 +20,7 @@ from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
 
 HEIGHT, END_TIME, FRAMES = 6.0, 0.55, 220
 REFERENCES = {"total": es.Never(), "updated": es.Every(5), "eulerian": es.Always()}
-SERIES = Path(__file__).parents[1] / "validation" / "reference" / "bendY_2.csv"
+SERIES = Path(__file__).parents[1] / "warp_eulsph" / "validation" / "reference" / "bendY_2.csv"
 TIP_2D = 2.897  # m, measured: -n 32 --reference total
 
 

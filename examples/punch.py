@@ -22,7 +22,7 @@ from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
 END_TIME, FRAMES = 0.03, 300
 CORNER = np.array([1.0, 1.0])
 REFERENCES = {"total": es.Never(), "updated": es.Every(5), "eulerian": es.Always()}
-SERIES = Path(__file__).parents[1] / "validation" / "reference" / "punch_16_3.csv"
+SERIES = Path(__file__).parents[1] / "warp_eulsph" / "validation" / "reference" / "punch_16_3.csv"
 # (time [s], least and largest reaction [MN/m] of the reference's refinement levels)
 REACTIONS = ((0.005, 1.257, 1.270), (0.010, 3.13, 3.17), (0.015, 3.55, 3.73))
 

@@ -21,7 +21,7 @@ FRAME = 2e-4  # s
 SPIN = 105.0  # rad/s
 CORNER = np.array([0.5, 0.5])
 REFERENCES = {"total": es.Never(), "updated": es.Every(5), "eulerian": es.Always()}
-SERIES = Path(__file__).parents[1] / "validation" / "reference" / "spin2d105_2.csv"
+SERIES = Path(__file__).parents[1] / "warp_eulsph" / "validation" / "reference" / "spin2d105_2.csv"
 
 
 def build(n: int, reference: es.ReferencePolicy) -> es.Simulation:

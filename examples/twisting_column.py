@@ -21,7 +21,7 @@ from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
 HEIGHT, END_TIME, FRAMES = 6.0, 0.11, 110
 CORNER = np.array([0.5, HEIGHT, 0.5])
 REFERENCES = {"total": es.Never(), "updated": es.Every(5), "eulerian": es.Always()}
-SERIES = Path(__file__).parents[1] / "validation" / "reference" / "twist_2.csv"
+SERIES = Path(__file__).parents[1] / "warp_eulsph" / "validation" / "reference" / "twist_2.csv"
 
 
 def build(n: int, reference: es.ReferencePolicy) -> es.Simulation:

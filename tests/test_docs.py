@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 METHOD = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-FOLDERS = ("warp_eulsph", "examples", "tests", "validation", "docs")
+FOLDERS = ("warp_eulsph", "examples", "tests", "docs")
 SOURCES = sorted(path for folder in FOLDERS[:3] for path in (ROOT / folder).rglob("*.py"))
 EQUATIONS = set(re.findall(r"\((M\d+)\)", METHOD))
 
@@ -26,7 +26,7 @@ def test_all_equations_are_defined():
 def test_files_named_in_documents_exist(path):
     text = path.read_text(encoding="utf-8")
     named = re.findall(r"(?<![\w./-])((?:[\w.-]+/)*[\w-]+\.(?:py|md|csv|toml))\b", text)
-    named += re.findall(r"`((?:warp_eulsph|examples|tests|docs|validation)/[\w/]*)`", text)
+    named += re.findall(r"`((?:warp_eulsph|examples|tests|docs)/[\w/]*)`", text)
     # Short names stand beside a full one: `correction.py` in a list that began with `warp_eulsph/operators/…`.
     short = {file.name for folder in FOLDERS for file in (ROOT / folder).rglob("*")}
     missing = [name for name in named if not (ROOT / name).exists() and ("/" in name or name not in short)]

@@ -15,7 +15,8 @@ LAYERS = [
     {"operators"},
     {"scheme", "contact"},
     {"simulation", "schedule", "diagnostics", "output", "geometry"},
-    {"cases", "cli"},
+    {"validation"},
+    {"cases", "cli", "__main__"},
 ]
 LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 MAX_LINES, MAX_KERNEL_LINES = 400, 60

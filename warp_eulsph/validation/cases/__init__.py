@@ -1,0 +1,1 @@
+"""One validation case per file; each module defines ``CASE``."""
