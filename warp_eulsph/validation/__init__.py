@@ -1,5 +1,5 @@
 """Cases with references that no run of this package made: exact solutions, published and independent figures."""
 
-from .case import Case, cases
+from .case import Case, cases, load, names
 
-__all__ = ["Case", "cases"]
+__all__ = ["Case", "cases", "load", "names"]

@@ -13,7 +13,7 @@ class Case:
     """One problem with a reference.
 
     Args:
-        name: as typed on the command line.
+        name: as typed on the command line; that of its module.
         title: what is solved, in one line.
         source: where the reference comes from.
         run: the figures, each with its band and reference, from ``run(quick)``; ``quick`` takes a coarse resolution
@@ -26,9 +26,17 @@ class Case:
     run: Callable[[bool], Sequence[Figure]]
 
 
-def cases() -> dict[str, Case]:
-    """All cases by name: the modules of ``warp_eulsph/validation/cases/``."""
+def names() -> list[str]:
+    """Names of all cases: the modules of ``warp_eulsph/validation/cases/``, one case each, of the same name."""
     package = importlib.import_module(".cases", __package__)
-    modules = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
-    found = [importlib.import_module(f"{package.__name__}.{name}").CASE for name in modules]
-    return {case.name: case for case in found}
+    return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+
+
+def load(name: str) -> Case:
+    """The case of that name, without importing the others."""
+    return importlib.import_module(f".cases.{name}", __package__).CASE
+
+
+def cases() -> dict[str, Case]:
+    """All cases by name."""
+    return {name: load(name) for name in names()}
