@@ -14,15 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import warp as wp
-from bar_exact import DENSITY, LENGTH, SPEED, WAVE_SPEED, YOUNG, bar_exact
 
 import warp_eulsph as es
 from warp_eulsph.output import Figure, SnapshotWriter, table
+from warp_eulsph.validation.cases.bar import LIMITED, build, errors, measure
 
-END_TIME = 5e-4
-AMPLITUDE = SPEED * 0.25 * LENGTH / WAVE_SPEED  # of the end displacement [m]
-FRAMES = 500
-LIMITED = es.LaxWendroff(limiter=es.FluxCorrectedTransport(sensor=es.DimensionlessSensor()))
 RUNS = {
     "total Lagrangian": (es.Never(), es.LaxWendroff()),
     "Eulerian": (es.Always(), es.LaxWendroff()),
@@ -30,49 +26,15 @@ RUNS = {
 }
 
 
-def build(n: int, reference: es.ReferencePolicy, scheme: es.LaxWendroff) -> es.Simulation:
-    """The bar as n particles.
-
-    The wall holds a particle at x = 0 of half the volume, and the last particle ends at the free end, so that the
-    length is exact. A dilation of 1 gives the three-particle support of the paper.
-    """
-    dx = LENGTH / (n - 0.5)
-    x = np.arange(n) * dx
-    volume = np.full(n, dx)
-    volume[0] = 0.5 * dx
-    moving = np.clip((x + 0.5 * dx - 0.75 * LENGTH) / dx, 0.0, 1.0)  # share of the particle in the moving quarter
-    body = es.Body(
-        x=x[:, None],
-        volume=volume,
-        spacing=dx,
-        material=es.Bar(density=DENSITY, young=YOUNG),
-        velocity=SPEED * moving[:, None],
-    )
-    return es.Simulation(body, boundaries=[es.Fixed([0])], reference=reference, scheme=scheme, dilation=1.0)
-
-
-def run(simulation: es.Simulation, writer: SnapshotWriter | None) -> dict[str, np.ndarray]:
-    """Histories of time, the last particle's displacement and velocity, their exact values, and the energy."""
-    X = simulation.x[-1, 0]
-    rows = []
-    for k, t in enumerate(simulation.frames(np.linspace(0.0, END_TIME, FRAMES + 1))):
-        rows.append([t, simulation.x[-1, 0] - X, simulation.v[-1, 0], *bar_exact(X, t), simulation.energy()["total"]])
-        if writer is not None and k % 10 == 0:
-            writer.write(simulation)
-    return dict(zip(("t", "u", "v", "u_exact", "v_exact", "energy"), np.array(rows).T, strict=True))
-
-
 def figures(name: str, n: int, history: dict[str, np.ndarray], residual: float) -> list[Figure]:
     """What the run is judged by; the bands are those of the benchmark, which falls at first order."""
     energy = history["energy"] / history["energy"][0]
-    error = np.sqrt(np.mean((history["u"] - history["u_exact"]) ** 2)) / AMPLITUDE
-    overshoot = np.abs(history["u"]).max() / AMPLITUDE - 1.0
-    velocity_overshoot = np.abs(history["v"]).max() / SPEED - 1.0
-    limited = "limiter" in name
+    found, limited = errors(history), "limiter" in name
+    error, overshoot = found["rms_error"], found["overshoot"]
     return [
         Figure(f"{name}: rms displacement error / amplitude", error, 0.0, 0.2 if limited else 0.14 * 40 / n, 0.0),
         Figure(f"{name}: overshoot / amplitude", overshoot, high=0.05 if limited else 0.3, reference=0.0),
-        Figure(f"{name}: velocity overshoot / 5 m/s", velocity_overshoot, reference=0.0),
+        Figure(f"{name}: velocity overshoot / 5 m/s", found["velocity_overshoot"], reference=0.0),
         Figure(f"{name}: largest energy / first", energy.max(), 0.0, 1.0 + 1e-9, 1.0),
         Figure(f"{name}: energy kept", energy[-1], 0.0, 1.0, 1.0),
         Figure(f"{name}: ledger residual / energy", abs(residual) / history["energy"][0], 0.0, 1e-10, 0.0),
@@ -112,7 +74,7 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     for name, (reference, scheme) in RUNS.items():
         simulation = build(args.n, reference, scheme)
         writer = SnapshotWriter(args.output) if name == "Eulerian" else None
-        histories[name] = run(simulation, writer)
+        histories[name] = measure(simulation, writer)
         checked += figures(name, args.n, histories[name], simulation.energy()["residual"])
     draw(histories, args.output / "bar.png")
     print(table(checked))

@@ -14,55 +14,25 @@ from pathlib import Path
 import numpy as np
 import warp as wp
 
-import warp_eulsph as es
-from warp_eulsph.geometry import box
 from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
+from warp_eulsph.validation.cases.bending_column import FIRST_SWING, SERIES, build, measure
+from warp_eulsph.validation.history import History, series
+from warp_eulsph.validation.solids import FORMS
 
-HEIGHT, END_TIME, FRAMES = 6.0, 0.55, 220
-REFERENCES = {"total": es.Never(), "updated": es.Every(5), "eulerian": es.Always()}
-SERIES = Path(__file__).parents[1] / "warp_eulsph" / "validation" / "reference" / "bendY_2.csv"
 TIP_2D = 2.897  # m, measured: -n 32 --reference total
 
 
-def build(dim: int, n: int, reference: es.ReferencePolicy) -> es.Simulation:
-    """The column, n particles across; the lowest layer is held."""
-    spacing = 1.0 / n
-    x, volume = box((-0.5, 0.0, -0.5)[:dim], (0.5, HEIGHT, 0.5)[:dim], spacing)
-    velocity = np.zeros_like(x)
-    velocity[:, 0] = 10.0 * x[:, 1] / HEIGHT
-    rubber = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3 if dim == 2 else 0.45)
-    body = es.Body(x=x, volume=volume, material=rubber, velocity=velocity)
-    return es.Simulation(body, boundaries=[es.Fixed(lambda X: X[:, 1] < spacing)], reference=reference)
-
-
-def run(simulation: es.Simulation, writer: SnapshotWriter) -> dict[str, np.ndarray]:
-    """Histories of time, sideways displacement of the tip's centre, and energy."""
-    X = simulation.x
-    tip = np.zeros(X.shape[1])
-    tip[1] = HEIGHT
-    distance = np.linalg.norm(X - tip, axis=1)
-    nearest = distance < 1.01 * distance.min()
-    rows = []
-    for k, t in enumerate(simulation.frames(np.linspace(0.0, END_TIME, FRAMES + 1))):
-        # The tip lies half a spacing beyond the last particles: their F carries it.
-        carried = simulation.x[nearest] + np.einsum("nij,nj->ni", simulation.F[nearest], tip - X[nearest])
-        rows.append([t, carried[:, 0].mean(), simulation.energy()["total"]])
-        if k % 20 == 0:
-            writer.write(simulation)
-    return dict(zip(("t", "tip", "energy"), np.array(rows).T, strict=True))
-
-
-def figures(dim: int, n: int, history: dict[str, np.ndarray], residual: float, series: np.ndarray) -> list[Figure]:
+def figures(dim: int, n: int, history: History, residual: float, bent: History) -> list[Figure]:
     """The bands are measured ones: errors of first order, energy lost to the dissipation and to M12."""
-    first = series["t"] < END_TIME
-    reference = series["utx"][first].max() if dim == 3 else TIP_2D
+    first = bent["t"] < FIRST_SWING
+    reference = bent["utx"][first].max() if dim == 3 else TIP_2D
     top = history["tip"].argmax()
     energy = history["energy"] / history["energy"][0]
     error = history["tip"][top] / reference - 1.0
     checked = [
         Figure("largest tip displacement [m]", history["tip"][top], reference=reference),
         Figure("its relative error", error, -0.02, (0.08 if dim == 2 else 0.1) * 8 / n, 0.0),
-        Figure("its time [s]", history["t"][top], reference=series["t"][first][series["utx"][first].argmax()]),
+        Figure("its time [s]", history["t"][top], reference=bent["t"][first][bent["utx"][first].argmax()]),
         Figure("energy kept", energy[-1], 0.8, 1.0 + 1e-4, 1.0),
         Figure("largest energy / first", energy.max(), 0.0, 1.0 + 1e-4, 1.0),
         Figure("ledger residual / energy", abs(residual) / history["energy"][0], 0.0, 1e-10, 0.0),
@@ -70,7 +40,7 @@ def figures(dim: int, n: int, history: dict[str, np.ndarray], residual: float, s
     return checked if dim == 3 else [figure for figure in checked if figure.name != "its time [s]"]
 
 
-def draw(dim: int, history: dict[str, np.ndarray], series: np.ndarray, writer: SnapshotWriter, path: Path) -> None:
+def draw(dim: int, history: History, bent: History, writer: SnapshotWriter, path: Path) -> None:
     """Tip displacement over time, and the bent column."""
     import matplotlib
 
@@ -80,8 +50,8 @@ def draw(dim: int, history: dict[str, np.ndarray], series: np.ndarray, writer: S
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5))
     left.plot(history["t"], history["tip"], label="particles")
     if dim == 3:
-        shown = series["t"] < END_TIME
-        left.plot(series["t"][shown], series["utx"][shown], "k--", lw=1, label="reference")
+        shown = bent["t"] < FIRST_SWING
+        left.plot(bent["t"][shown], bent["utx"][shown], "k--", lw=1, label="reference")
     left.set(xlabel="time [s]", ylabel="tip displacement [m]")
     left.legend()
     last = read_snapshot(writer.last)
@@ -100,15 +70,15 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-n", type=int, default=8, help="particles across")
     parser.add_argument("--dim", type=int, choices=(2, 3), default=2)
-    parser.add_argument("--reference", choices=REFERENCES, default="eulerian")
+    parser.add_argument("--reference", choices=FORMS, default="eulerian")
     parser.add_argument("--output", type=Path, default=Path("runs/bending_column"))
     args = parser.parse_args(argv)
     wp.config.log_level = wp.LOG_WARNING
-    series = np.genfromtxt(SERIES, delimiter=",", names=True)
-    simulation, writer = build(args.dim, args.n, REFERENCES[args.reference]), SnapshotWriter(args.output)
-    history = run(simulation, writer)
-    draw(args.dim, history, series, writer, args.output / "bending_column.png")
-    checked = figures(args.dim, args.n, history, simulation.energy()["residual"], series)
+    bent = series(SERIES)
+    simulation, writer = build(args.dim, args.n, FORMS[args.reference]), SnapshotWriter(args.output)
+    history = measure(simulation, FIRST_SWING, writer)
+    draw(args.dim, history, bent, writer, args.output / "bending_column.png")
+    checked = figures(args.dim, args.n, history, simulation.energy()["residual"], bent)
     print(table(checked))
     print(f"picture {args.output / 'bending_column.png'}, snapshots {writer.series}")
     outside = [figure.name for figure in checked if not figure.accepted]

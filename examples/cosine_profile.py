@@ -16,56 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from warp_eulsph.scheme.scalar import ConservationLaw, LinearAdvection, OneStepLax, Scheme, TwoStepLaxWendroff
-
-LAX, LAX_WENDROFF = OneStepLax(), TwoStepLaxWendroff()
-#: (scheme, h/dx, CFL) -> largest value, place, least value, L2 error, as text so that every printed digit counts.
-#: On three particles (h = dx) Lax at CFL 1 and Lax-Wendroff at CFL 2 are exact shifts.
-EXPECTED = {
-    (LAX, 1.0, 0.5): ("0.33843", "0.8088", "0.0000", "0.20153"),
-    (LAX, 1.0, 1.0): ("0.98296", "0.8000", "0.0000", "0.00000"),
-    (LAX_WENDROFF, 1.0, 0.5): ("0.70083", "0.7418", "-0.2778", "0.19629"),
-    (LAX_WENDROFF, 1.0, 1.0): ("0.71695", "0.7544", "-0.2025", "0.16321"),
-    (LAX_WENDROFF, 1.0, 1.5): ("0.77236", "0.7724", "-0.1234", "0.11623"),
-    (LAX_WENDROFF, 1.0, 2.0): ("0.98296", "0.8000", "0.0000", "0.00000"),
-    (LAX_WENDROFF, 1.2, 1.0): ("0.69243", "0.7475", "-0.2219", "0.17935"),
-    (LAX_WENDROFF, 1.2, 2.0): ("0.89140", "0.7830", "-0.1062", "0.07041"),
-}
-PARTICLES, BOX, END = 50, 3.0, 0.6
-
-
-def profile(x: np.ndarray, centre: float) -> np.ndarray:
-    """The cosine hat of half width 0.12."""
-    away = np.abs(x - centre)
-    return np.where(away <= 0.12, 0.5 * (1.0 + np.cos(np.pi * away / 0.12)), 0.0)
-
-
-def solve(scheme: Scheme, dilation: float, cfl: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positions in ]0, 1[ and the solution there at t = 0.6."""
-    dx = 1.0 / PARTICLES
-    x = (np.arange(round(BOX / dx)) + 0.5) * dx
-    law = ConservationLaw(
-        x[:, None],
-        dx,
-        profile(x, 0.2),
-        flux=LinearAdvection((1.0,)),
-        scheme=scheme,
-        dilation=dilation,
-        periodic=(BOX,),
-    )
-    law.run(END, cfl * dx)
-    return x[:PARTICLES], law.values[:PARTICLES]
+from warp_eulsph.validation.cases.cosine_profile import END, EXPECTED, LAX, LAX_WENDROFF, measure, profile, solve
 
 
 def figures(x: np.ndarray, u: np.ndarray) -> tuple[str, str, str, str]:
     """Largest value, its place, least value, L2 error as printed."""
-    top = int(np.argmax(u))
-    left, middle, right = u[top - 1 : top + 2]
-    dx = x[1] - x[0]
-    place = x[top] + 0.5 * dx * (left - right) / (left - 2.0 * middle + right)
-    error = np.sqrt(((u - profile(x, 0.2 + END)) ** 2).sum() * dx)
-    least = u.min() + 0.0 if abs(u.min()) > 1e-12 else 0.0  # no minus sign before rounding errors
-    return f"{u.max():.5f}", f"{place:.4f}", f"{least:.4f}", f"{error:.5f}"
+    largest, place, least, error = measure(x, u)
+    least = least if abs(least) > 1e-12 else 0.0  # no minus sign before rounding errors
+    return f"{largest:.5f}", f"{place:.4f}", f"{least:.4f}", f"{error:.5f}"
 
 
 def draw(path: Path, solutions: dict) -> None:

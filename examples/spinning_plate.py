@@ -14,50 +14,20 @@ import numpy as np
 import warp as wp
 
 import warp_eulsph as es
-from warp_eulsph.geometry import box
 from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
-
-FRAME = 2e-4  # s
-SPIN = 105.0  # rad/s
-CORNER = np.array([0.5, 0.5])
-REFERENCES = {"total": es.Never(), "updated": es.Every(5), "eulerian": es.Always()}
-SERIES = Path(__file__).parents[1] / "warp_eulsph" / "validation" / "reference" / "spin2d105_2.csv"
+from warp_eulsph.validation.cases.spinning_plate import SERIES, SPIN, build, measure
+from warp_eulsph.validation.history import History, at, series
+from warp_eulsph.validation.solids import FORMS, RUBBER
 
 
-def build(n: int, reference: es.ReferencePolicy) -> es.Simulation:
-    """The plate as n × n particles."""
-    x, volume = box((-0.5, -0.5), (0.5, 0.5), 1.0 / n)
-    velocity = SPIN * np.stack([-x[:, 1], x[:, 0]], axis=1)
-    rubber = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
-    return es.Simulation(es.Body(x=x, volume=volume, material=rubber, velocity=velocity), reference=reference)
-
-
-def corner_radius(simulation: es.Simulation, X: np.ndarray) -> float:
-    """Distance of the plate's corner from its centre [m], carried from the nearest particle by its F."""
-    a = np.argmin(np.linalg.norm(X - CORNER, axis=1))
-    return float(np.linalg.norm(simulation.x[a] + simulation.F[a] @ (CORNER - X[a])))
-
-
-def run(simulation: es.Simulation, until: float, writer: SnapshotWriter) -> dict[str, np.ndarray]:
-    """Histories of time, corner radius, strain energy, total energy and angular momentum."""
-    X, rows = simulation.x, []
-    for k, t in enumerate(simulation.frames(np.arange(round(until / FRAME) + 1) * FRAME)):
-        energy = simulation.energy()
-        spin = simulation.angular_momentum()[0]
-        rows.append([t, corner_radius(simulation, X), energy["stored"], energy["total"], spin])
-        if k % 10 == 0:
-            writer.write(simulation)
-    return dict(zip(("t", "radius", "stored", "energy", "spin"), np.array(rows).T, strict=True))
-
-
-def figures(n: int, history: dict[str, np.ndarray], simulation: es.Simulation, series: np.ndarray) -> list[Figure]:
+def figures(n: int, history: History, simulation: es.Simulation, reference: History) -> list[Figure]:
     """Errors over the whole history. The bands are measured ones (about twice the error), falling at first order."""
-    radius = np.interp(history["t"], series["t"], series["Rcorner"])
-    stored = np.interp(history["t"], series["t"], series["W"])
+    radius = at(reference, "Rcorner", history["t"])
+    stored = at(reference, "W", history["t"])
     radius_error = np.sqrt(np.mean((history["radius"] - radius) ** 2)) / np.ptp(radius)
     stored_error = np.sqrt(np.mean((history["stored"] - stored) ** 2)) / stored.max()
     energy = history["energy"] / history["energy"][0]
-    momentum = np.abs(simulation.momentum()).max() / (1100.0 * SPIN)
+    momentum = np.abs(simulation.momentum()).max() / (RUBBER.density * SPIN)
     return [
         Figure("corner radius, rms error / range", radius_error, 0.0, 0.2 * 16 / n, 0.0),
         Figure("strain energy, rms error / largest", stored_error, 0.0, 0.2 * 16 / n, 0.0),
@@ -71,7 +41,7 @@ def figures(n: int, history: dict[str, np.ndarray], simulation: es.Simulation, s
     ]
 
 
-def draw(history: dict[str, np.ndarray], series: np.ndarray, writer: SnapshotWriter, path: Path) -> None:
+def draw(history: History, reference: History, writer: SnapshotWriter, path: Path) -> None:
     """Corner radius over time, and the pressure at the end."""
     import matplotlib
 
@@ -80,8 +50,8 @@ def draw(history: dict[str, np.ndarray], series: np.ndarray, writer: SnapshotWri
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.5))
     left.plot(1e3 * history["t"], history["radius"], label="particles")
-    shown = series["t"] <= history["t"][-1]
-    left.plot(1e3 * series["t"][shown], series["Rcorner"][shown], "k--", lw=1, label="reference")
+    shown = reference["t"] <= history["t"][-1]
+    left.plot(1e3 * reference["t"][shown], reference["Rcorner"][shown], "k--", lw=1, label="reference")
     left.set(xlabel="time [ms]", ylabel="corner radius [m]")
     left.legend()
     last = read_snapshot(writer.last)
@@ -97,16 +67,16 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     """Run, print, draw; the checked figures by name."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-n", type=int, default=16, help="particles along a side")
-    parser.add_argument("--reference", choices=REFERENCES, default="eulerian")
+    parser.add_argument("--reference", choices=FORMS, default="eulerian")
     parser.add_argument("--until", type=float, default=0.02, help="end time [s], at most 0.15; the bands are for 0.02")
     parser.add_argument("--output", type=Path, default=Path("runs/spinning_plate"))
     args = parser.parse_args(argv)
     wp.config.log_level = wp.LOG_WARNING
-    series = np.genfromtxt(SERIES, delimiter=",", names=True)
-    simulation, writer = build(args.n, REFERENCES[args.reference]), SnapshotWriter(args.output)
-    history = run(simulation, args.until, writer)
-    draw(history, series, writer, args.output / "spinning_plate.png")
-    checked = figures(args.n, history, simulation, series)
+    reference = series(SERIES)
+    simulation, writer = build(args.n, FORMS[args.reference]), SnapshotWriter(args.output)
+    history = measure(simulation, args.until, writer)
+    draw(history, reference, writer, args.output / "spinning_plate.png")
+    checked = figures(args.n, history, simulation, reference)
     print(table(checked))
     print(f"picture {args.output / 'spinning_plate.png'}, snapshots {writer.series}")
     outside = [figure.name for figure in checked if not figure.accepted]

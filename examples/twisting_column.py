@@ -11,68 +11,32 @@ the energy kept against the reference (twist_2.csv); draws the rotation over tim
 import argparse
 from pathlib import Path
 
-import numpy as np
 import warp as wp
 
-import warp_eulsph as es
-from warp_eulsph.geometry import box
 from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
-
-HEIGHT, END_TIME, FRAMES = 6.0, 0.11, 110
-CORNER = np.array([0.5, HEIGHT, 0.5])
-REFERENCES = {"total": es.Never(), "updated": es.Every(5), "eulerian": es.Always()}
-SERIES = Path(__file__).parents[1] / "warp_eulsph" / "validation" / "reference" / "twist_2.csv"
+from warp_eulsph.validation.cases.twisting_column import END_TIME, build, measure, reference_history
+from warp_eulsph.validation.history import History
+from warp_eulsph.validation.solids import FORMS
 
 
-def build(n: int, reference: es.ReferencePolicy) -> es.Simulation:
-    """The column, n particles across; the lowest layer is held."""
-    spacing = 1.0 / n
-    x, volume = box((-0.5, 0.0, -0.5), (0.5, HEIGHT, 0.5), spacing)
-    spin = 105.0 * np.sin(np.pi * x[:, 1] / (2.0 * HEIGHT))
-    velocity = np.stack([spin * x[:, 2], np.zeros(len(x)), -spin * x[:, 0]], axis=1)
-    rubber = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
-    body = es.Body(x=x, volume=volume, material=rubber, velocity=velocity)
-    return es.Simulation(body, boundaries=[es.Fixed(lambda X: X[:, 1] < spacing)], reference=reference)
-
-
-def turned(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Rotation about the axis since the first entry [degrees], counted on beyond a half turn."""
-    return np.degrees(np.unwrap(np.arctan2(x, z)) - np.arctan2(x[0], z[0]))
-
-
-def run(simulation: es.Simulation, writer: SnapshotWriter) -> dict[str, np.ndarray]:
-    """Histories of time, rotation of the top corner, strain energy and energy."""
-    X = simulation.x
-    a = np.argmin(np.linalg.norm(X - CORNER, axis=1))
-    rows = []
-    for k, t in enumerate(simulation.frames(np.linspace(0.0, END_TIME, FRAMES + 1))):
-        corner = simulation.x[a] + simulation.F[a] @ (CORNER - X[a])
-        energy = simulation.energy()
-        rows.append([t, corner[0], corner[2], energy["stored"], energy["total"]])
-        if k % 10 == 0:
-            writer.write(simulation)
-    t, x, z, stored, total = np.array(rows).T
-    return {"t": t, "rotation": turned(x, z), "stored": stored, "energy": total}
-
-
-def figures(n: int, history: dict[str, np.ndarray], residual: float, series: np.ndarray) -> list[Figure]:
+def figures(n: int, history: History, residual: float, reference: History) -> list[Figure]:
     """The bands are measured ones: an error of first order, and the energy lost by a coarse column."""
-    rotation = turned(0.5 + series["ucx"], 0.5 + series["ucz"])
+    rotation = reference["rotation"]
     top, top_reference = history["rotation"].argmax(), rotation.argmax()
     energy = history["energy"] / history["energy"][0]
     error = history["rotation"][top] / rotation[top_reference] - 1.0
     return [
         Figure("largest rotation [degrees]", history["rotation"][top], reference=rotation[top_reference]),
         Figure("its relative error", error, -0.02, 0.17 * 6 / n, 0.0),
-        Figure("its time [s]", history["t"][top], 0.08, 0.11, series["t"][top_reference]),
-        Figure("largest strain energy [J]", history["stored"].max(), reference=series["W"].max()),
+        Figure("its time [s]", history["t"][top], 0.08, 0.11, reference["t"][top_reference]),
+        Figure("largest strain energy [J]", history["stored"].max(), reference=reference["stored"].max()),
         Figure("energy kept", energy[-1], 0.9, 1.0 + 1e-4, 1.0),
         Figure("largest energy / first", energy.max(), 0.0, 1.0 + 1e-4, 1.0),
         Figure("ledger residual / energy", abs(residual) / history["energy"][0], 0.0, 1e-10, 0.0),
     ]
 
 
-def draw(history: dict[str, np.ndarray], series: np.ndarray, writer: SnapshotWriter, path: Path) -> None:
+def draw(history: History, reference: History, writer: SnapshotWriter, path: Path) -> None:
     """Rotation over time, and the twisted column."""
     import matplotlib
 
@@ -82,9 +46,8 @@ def draw(history: dict[str, np.ndarray], series: np.ndarray, writer: SnapshotWri
     figure = plt.figure(figsize=(11, 5))
     left, right = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
     left.plot(1e3 * history["t"], history["rotation"], label="particles")
-    shown = series["t"] < END_TIME
-    reference = turned(0.5 + series["ucx"], 0.5 + series["ucz"])
-    left.plot(1e3 * series["t"][shown], reference[shown], "k--", lw=1, label="reference")
+    shown = reference["t"] < END_TIME
+    left.plot(1e3 * reference["t"][shown], reference["rotation"][shown], "k--", lw=1, label="reference")
     left.set(xlabel="time [ms]", ylabel="rotation of the top corner [degrees]")
     left.legend()
     last = read_snapshot(writer.last)
@@ -103,15 +66,15 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     """Run, print, draw; the checked figures by name."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-n", type=int, default=6, help="particles across")
-    parser.add_argument("--reference", choices=REFERENCES, default="eulerian")
+    parser.add_argument("--reference", choices=FORMS, default="eulerian")
     parser.add_argument("--output", type=Path, default=Path("runs/twisting_column"))
     args = parser.parse_args(argv)
     wp.config.log_level = wp.LOG_WARNING
-    series = np.genfromtxt(SERIES, delimiter=",", names=True)
-    simulation, writer = build(args.n, REFERENCES[args.reference]), SnapshotWriter(args.output)
-    history = run(simulation, writer)
-    draw(history, series, writer, args.output / "twisting_column.png")
-    checked = figures(args.n, history, simulation.energy()["residual"], series)
+    reference = reference_history()
+    simulation, writer = build(args.n, FORMS[args.reference]), SnapshotWriter(args.output)
+    history = measure(simulation, writer)
+    draw(history, reference, writer, args.output / "twisting_column.png")
+    checked = figures(args.n, history, simulation.energy()["residual"], reference)
     print(table(checked))
     print(f"picture {args.output / 'twisting_column.png'}, snapshots {writer.series}")
     outside = [figure.name for figure in checked if not figure.accepted]
