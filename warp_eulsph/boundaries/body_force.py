@@ -19,11 +19,13 @@ class BodyForce(Boundary):
         value: b [m/s²]; constant, array or function of (x, t) (see ``Value``).
         region: particles (see ``Region``); None takes all of the body.
         body: name of the body, any by default.
+        material: a function takes the initial position X instead of the present x, as manufactured solutions state it.
     """
 
     value: Any
     region: Region | None = None
     body: str | None = None
+    material: bool = False
 
     def bind(self, assembly: Assembly) -> "BoundBodyForce":
         return BoundBodyForce(self, assembly)
@@ -55,8 +57,11 @@ class BoundBodyForce(Bound):
         self.space, self.device, self.mass = assembly.space, assembly.device, assembly.particles.mass
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
+        self.X: wp.array | None = None
+        if condition.material:
+            self.X = wp.array(assembly.X.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
-        values = self.values.at(state.x, clock, fraction)
+        values = self.values.at(state.x if self.X is None else self.X, clock, fraction)
         arguments = [self.values.indices, values, self.mass, external]
         wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)
