@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+import warp_eulsph
+
 PACKAGE = Path(__file__).parents[1] / "warp_eulsph"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
@@ -19,7 +21,10 @@ LAYERS = [
     {"cases", "cli", "__main__"},
 ]
 LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
+# The front door shows rooms up to the simulation: those above may come in by it.
+LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
+FRONT_ENDS = {"validation/command.py"}  # what the command line prints is its result
 
 
 def room(path):
@@ -81,6 +86,8 @@ class TestFile:
         assert not long, f"kernels of at most {MAX_KERNEL_LINES} lines, got {long}"
 
     def test_logs_instead_of_printing(self, path):
+        if path.relative_to(PACKAGE).as_posix() in FRONT_ENDS:
+            return
         tree = ast.parse(path.read_text(encoding="utf-8"))
         prints = [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "print"]
         assert not prints, f"print in lines {prints}; use logging"

@@ -1,6 +1,6 @@
 """Histories: of a run, sampled at given times, and of the references that came with the package."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +14,23 @@ History = dict[str, np.ndarray]
 
 def record(
     simulation: Simulation,
-    times: Sequence[float],
+    times: np.ndarray,
     observe: Callable[[], dict[str, float]],
     *,
     writer: Any = None,
     stride: int = 10,
 ) -> History:
-    """What ``observe`` gives at increasing ``times`` [s], which are hit exactly.
+    """What ``observe`` gives at increasing ``times``, which are hit exactly.
 
     Args:
         simulation: what is run.
-        times: when to look, from the present time on.
+        times: when to look [s], (k,), from the present time on.
         observe: figures of the present state, the same names every time.
         writer: object with ``write(simulation)``, asked every ``stride`` looks; None writes nothing.
         stride: looks between two snapshots.
     """
     rows = []
-    for k, t in enumerate(simulation.frames(times)):
+    for k, t in enumerate(simulation.frames(times.tolist())):
         rows.append({"t": t, **observe()})
         if writer is not None and k % stride == 0:
             writer.write(simulation)
@@ -41,7 +41,7 @@ def series(name: str) -> History:
     """A reference: the columns of ``warp_eulsph/validation/reference/<name>.csv``, SI units."""
     path = Path(__file__).parent / "reference" / f"{name}.csv"
     table = np.genfromtxt(path, delimiter=",", names=True)
-    return {column: table[column] for column in table.dtype.names}
+    return {column: table[column] for column in table.dtype.names or ()}
 
 
 def at(history: History, name: str, t: Any) -> Any:

@@ -73,7 +73,7 @@ def build(dim: int, n: int, reference: ReferencePolicy) -> tuple[Simulation, Sta
     for i in range(dim):
         for position, image in ((0.0, Wall()), (1.0, Antisymmetry())):
             point, normal = np.full(dim, position), np.eye(dim)[i] * (2 * position - 1)
-            body, ghosts = mirror(body, point=point, normal=normal, depth=depth, image=image)
+            body, ghosts = mirror(body, point=point.tolist(), normal=normal.tolist(), depth=depth, image=image)
             conditions.append(ghosts)
     return Simulation(body, boundaries=conditions, reference=reference, dilation=DILATION), wave
 
