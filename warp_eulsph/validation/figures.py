@@ -8,7 +8,9 @@ from ..output import Figure
 from .history import History
 
 
-def energy_figures(history: History, residual: float, *, suffix: str = "", loss: float = float("inf")) -> list[Figure]:
+def energy_figures(
+    history: History, residual: float, *, suffix: str = "", loss: float = float("inf"), gain: float = 1e-6
+) -> list[Figure]:
     """Drift and largest gain of the column ``energy``, and the residual of its books, over the energy at the start.
 
     Energy may be lost to dissipation, which is reported; a gain is a fault, beyond the errors of time integration.
@@ -18,11 +20,12 @@ def energy_figures(history: History, residual: float, *, suffix: str = "", loss:
         residual: of the books [J].
         suffix: of the figures' names.
         loss: largest loss accepted, relative.
+        gain: largest gain accepted, relative; the time integration's falls at second order with the step.
     """
     energy = history["energy"] / history["energy"][0]
     return [
         Figure(f"energy_drift{suffix}", energy[-1] - 1.0, low=-loss, reference=0.0),
-        Figure(f"energy_gain{suffix}", energy.max() - 1.0, high=1e-6, reference=0.0),
+        Figure(f"energy_gain{suffix}", energy.max() - 1.0, high=gain, reference=0.0),
         Figure(f"ledger_residual{suffix}", abs(residual) / history["energy"][0], 0.0, 1e-10, 0.0),
     ]
 

@@ -18,7 +18,7 @@ from ..solids import RUBBER, MaterialPoint
 
 HEIGHT = 6.0
 FRAME = 2.5e-3  # s
-FIRST_SWING, THREE_SWINGS = 0.55, 2.4  # s
+FIRST_SWING, THREE_SWINGS = 0.55, 2.6  # s; soft columns swing slower than the reference, whose third turn is at 2.26
 SERIES = "bendY_2"
 
 
