@@ -51,7 +51,7 @@ def run(quick: bool) -> Sequence[Figure]:
     Over the whole history: largest error of radius and height over the initial ones, rms error of the strain energy
     over its largest value.
     """
-    n = 12 if quick else 16
+    n = 12 if quick else 24
     simulation, lagrangian = build(n, Always()), build(n, Never())
     history, other = measure(simulation), measure(lagrangian)
     reference = {name: at(series(SERIES), name, history["t"]) for name in ("Rcorner", "ztop", "W")}
