@@ -1,11 +1,14 @@
 """Extreme distortion: the exact motions are what they claim to be, and the published claims that are cheap."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
+from warp_eulsph.validation import distortion_map
 from warp_eulsph.validation.cases import drop, kinematic_vortex, shear, vortex
 
 POINTS = box((0.55, 0.35), (0.95, 0.75), 0.1)[0]  # radii from 0.72 m to 1.13 m
@@ -121,3 +124,27 @@ def test_uniform_shear_exerts_no_force_with_exact_surface_vectors(reference):
     assert max(now["F"], now["stress"]) < 1e-10
     # The plate's own surface vectors see its pull; the mean over the last step lags by half a step, and M9 acts.
     assert abs(now["reaction"]) < 0.02
+
+
+# the map
+
+
+def test_map_tells_accurate_from_failed_and_writes_its_files(tmp_path):
+    """A run with steps far beyond its limit fails, at its mark and at all later ones, and says why."""
+
+    def start(n, reference):
+        options = {"time_step": es.TimeStep(fixed=2e-2)} if isinstance(reference, es.Always) else {}
+        return distortion_map.start_shear(n, reference, **options)
+
+    problem = replace(distortion_map.PROBLEMS[0], levels=(12,), marks={0.2: 0.02, 0.5: 0.05, 3.0: 0.3}, start=start)
+    verdicts = list(distortion_map.judge(problem, "always", 12))
+    assert verdicts[-1].verdict == "failed" and verdicts[-1].reason and verdicts[-1].error is None
+    problem = replace(problem, marks={0.2: 0.02, 0.5: 0.05})
+    verdicts = distortion_map.run([problem], ("never", "every 10"), False, tmp_path)
+    assert [(v.reference, v.distortion, v.verdict) for v in verdicts] == [
+        (name, mark, "accurate") for name in ("never", "every 10") for mark in problem.marks
+    ]
+    lines = (tmp_path / "distortion.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 5 and lines[0].startswith("problem,reference,level,distortion,verdict")
+    assert "| every 10 | accurate" in (tmp_path / "distortion.md").read_text(encoding="utf-8")
+    assert (tmp_path / "distortion_map.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,347 @@
+"""Which form of the reference holds at which distortion: runs, verdicts, table and picture of docs/distortion.md.
+
+    python -m warp_eulsph.validation.distortion_map [--quick] [--output DIR]
+
+Problems × references × resolutions; each run passes through increasing distortion and is judged at every mark:
+*accurate* (error below 5 %), *stable* (it goes on), or *failed*, with the reason: a particle inverted or not finite,
+energy gained out of nothing, an error above 100 %. *Stalled* runs stayed stable until their steps had become too small
+to go on. Writes ``distortion.md``, ``distortion.csv`` and ``distortion_map.png`` after every problem.
+"""
+
+import argparse
+import csv
+import logging
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .. import (
+    Always,
+    Every,
+    LaxWendroff,
+    Never,
+    ReferencePolicy,
+    Simulation,
+    SurfaceVectors,
+    UnstableError,
+    WhenDistorted,
+)
+from .cases import punch, shear, spinning_plate, vortex
+from .history import at, series
+from .solids import MaterialPoint
+
+_log = logging.getLogger(__name__)
+
+ACCURATE, FAILED_ERROR = 0.05, 1.0
+GAIN = 0.1  # energy out of nothing, over the present energy: what failing runs exceed within a few steps
+MOST_STEPS = 60_000
+
+#: Name -> reference, and options of the simulation.
+REFERENCES: dict[str, tuple[ReferencePolicy, dict[str, Any]]] = {
+    "never": (Never(), {}),
+    "every 50": (Every(50), {}),
+    "every 10": (Every(10), {}),
+    "every 5": (Every(5), {}),
+    "every 2": (Every(2), {}),
+    "criterion": (WhenDistorted(1.2), {}),
+    "always": (Always(), {}),
+    "always, M10": (Always(), {"scheme": LaxWendroff(correction=SurfaceVectors())}),
+}
+QUICK = ("never", "every 10", "always")
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulation and how it is judged: ``error()`` [-] is asked at every frame, None where there is no reference."""
+
+    simulation: Simulation
+    error: Callable[[], float | None]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A problem with a growing distortion.
+
+    Args:
+        name: of the problem.
+        distortion: what grows, with its unit.
+        error: what the error is.
+        levels: resolutions, coarse first.
+        marks: distortion -> time [s] at which it is reached.
+        frame: time between two looks [s].
+        start: (level, reference, options) -> Run.
+        options: whether ``start`` takes options of the simulation.
+    """
+
+    name: str
+    distortion: str
+    error: str
+    levels: Sequence[int]
+    marks: dict[float, float]
+    frame: float
+    start: Callable[..., Run]
+    options: bool = True
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One cell of the map."""
+
+    problem: str
+    reference: str
+    level: int
+    distortion: float
+    verdict: str
+    error: float | None
+    reason: str
+    steps: int
+
+
+AMPLITUDE = 0.5
+
+
+def start_vortex(rings: int, reference: ReferencePolicy, **options: Any) -> Run:
+    """The vortex at half its full amplitude: a shear of 11 at t = ½ s."""
+    simulation = vortex.build(rings, reference, AMPLITUDE, **options)
+    X, volume = simulation.bodies[0].x, simulation.bodies[0].volume
+
+    def error() -> float:
+        F = vortex.exact(X, simulation.t, AMPLITUDE)[2]
+        wrong, right = (volume @ np.square(G).sum(axis=(1, 2)) for G in (simulation.F - F, F - np.eye(2)))
+        return math.sqrt(wrong / right)
+
+    return Run(simulation, error)
+
+
+def start_shear(n: int, reference: ReferencePolicy, **options: Any) -> Run:
+    """The block in simple shear."""
+    simulation, upper = shear.build(n, reference, **options)
+
+    def error() -> float:
+        now = shear.errors(simulation, upper)
+        return max(now["F"], now["stress"])
+
+    return Run(simulation, error)
+
+
+def start_punch(n: int, reference: ReferencePolicy) -> Run:
+    """The punched block; its reference gives reactions until 15 ms."""
+    simulation, condition = punch.build(n, reference)
+    seen: dict[float, float] = {}
+
+    def error() -> float | None:
+        seen[simulation.t] = -1e-6 * simulation.reaction(condition)[1]
+        for time, bounds in punch.REACTIONS.items():
+            if abs(simulation.t - time) < 1e-6:
+                # mean over the half millisecond before: single steps ring
+                recent = [reaction for t, reaction in seen.items() if time - 0.5e-3 < t <= time]
+                return abs(float(np.mean(recent)) / (0.5 * sum(bounds)) - 1.0)
+        return None
+
+    return Run(simulation, error)
+
+
+def start_plate(n: int, reference: ReferencePolicy) -> Run:
+    """The spinning plate; its reference goes to 0.15 s."""
+    simulation, exact = spinning_plate.build(n, reference), series(spinning_plate.SERIES)
+    corner, wrong, right = MaterialPoint(simulation, np.array([0.5, 0.5])), [], []
+
+    def error() -> float:
+        right.append(at(exact, "Rcorner", simulation.t))
+        wrong.append(float(np.linalg.norm(corner.x)) - right[-1])
+        return math.sqrt(np.mean(np.square(wrong))) / max(np.ptp(right), 1e-12)
+
+    return Run(simulation, error)
+
+
+def _time_of_shear(gamma: float) -> float:
+    return math.asin(min(gamma / vortex.largest_shear(AMPLITUDE), 1.0)) / math.pi
+
+
+PROBLEMS = (
+    Problem(
+        "shear",
+        "shear",
+        "of F or stress",
+        (16, 32),
+        {gamma: gamma / shear.RATE for gamma in (0.5, 1.0, 2.0, 5.0, 10.0)},
+        0.01,
+        start_shear,
+    ),
+    Problem(
+        "vortex",
+        "largest shear",
+        "of F, L2",
+        (8, 16),
+        {gamma: _time_of_shear(gamma) for gamma in (1.0, 2.0, 4.0, 6.0, 8.0, 11.0)},
+        0.01,
+        start_vortex,
+    ),
+    Problem(
+        "punch",
+        "depth [%]",
+        "of the reaction",
+        (20, 40),
+        {4.0: 0.005, 9.0: 0.010, 14.0: 0.015, 19.0: 0.020, 24.0: 0.025, 29.0: 0.030},
+        1e-4,
+        start_punch,
+        options=False,
+    ),
+    Problem(
+        "spinning plate",
+        "turns of 60 ms",
+        "of the corner's radius, rms / range",
+        (16, 32),
+        {turns: turns * 2.0 * math.pi / spinning_plate.SPIN for turns in (0.25, 0.5, 1.0, 2.0, 2.5)},
+        5e-4,
+        start_plate,
+        options=False,
+    ),
+)
+
+
+def judge(problem: Problem, name: str, level: int) -> Iterator[Verdict]:
+    """Run one problem with one reference; a verdict at each mark."""
+    reference, options = REFERENCES[name]
+    run = problem.start(level, reference, **options)
+    simulation, start = run.simulation, run.simulation.energy()["total"]
+    ended: tuple[str, str] | None = None
+    for distortion, mark in problem.marks.items():
+        error = None
+        try:
+            while ended is None and simulation.t < mark:
+                left = mark - simulation.t
+                simulation.run(mark if left < 1.5 * problem.frame else simulation.t + problem.frame)
+                error = run.error()
+                if simulation.steps > MOST_STEPS:
+                    ended = ("stalled", f"{simulation.steps} steps taken, the last of {simulation.dt:.2g} s")
+        except UnstableError as raised:
+            what = str(raised).split(" has ")[-1].split(";")[0].split(", v =")[0].split(", must")[0]
+            ended = ("failed", f"{what} at {1e3 * raised.time:.4g} ms")
+        verdict, reason = ended or _grade(simulation, start, error)
+        yield Verdict(
+            problem.name, name, level, distortion, verdict, None if ended else error, reason, simulation.steps
+        )
+
+
+def _grade(simulation: Simulation, start: float, error: float | None) -> tuple[str, str]:
+    energy = simulation.energy()
+    gained = energy["total"] - start - energy["external"] - energy["constraint"]
+    if gained > GAIN * energy["total"]:
+        return "failed", f"energy gained: {100.0 * gained / energy['total']:.3g} % of what there is"
+    if error is not None and error > FAILED_ERROR:
+        return "failed", "error above 100 %"
+    return ("accurate" if error is not None and error < ACCURATE else "stable"), ""
+
+
+def run(problems: Sequence[Problem], names: Sequence[str], quick: bool, output: Path) -> list[Verdict]:
+    """Fill the map; the files are written anew after each problem."""
+    verdicts: list[Verdict] = []
+    output.mkdir(parents=True, exist_ok=True)
+    for problem in problems:
+        for level in problem.levels[:1] if quick else problem.levels:
+            for name in names:
+                if REFERENCES[name][1] and not problem.options:
+                    continue
+                row = list(judge(problem, name, level))
+                verdicts += row
+                shown = ", ".join(f"{v.distortion:g}: {v.verdict} {_percent(v.error)} {v.reason}" for v in row)
+                _log.info("%s %d %s: %s", problem.name, level, name, shown)
+        (output / "distortion.md").write_text(table(verdicts), encoding="utf-8")
+        write_csv(verdicts, output / "distortion.csv")
+        draw(verdicts, output / "distortion_map.png")
+    return verdicts
+
+
+def _percent(error: float | None) -> str:
+    return "" if error is None else f"{100.0 * error:.2g} %"
+
+
+def _groups(verdicts: Sequence[Verdict]) -> Iterator[tuple[Problem, int, list[str], list[float], dict[Any, Verdict]]]:
+    """Each problem and level with its references, distortions and cells by (reference, distortion)."""
+    problems = {problem.name: problem for problem in PROBLEMS}
+    for name, level in dict.fromkeys((v.problem, v.level) for v in verdicts):
+        cells = {(v.reference, v.distortion): v for v in verdicts if (v.problem, v.level) == (name, level)}
+        references, marks = (list(dict.fromkeys(key[k] for key in cells)) for k in (0, 1))
+        yield problems[name], level, references, marks, cells
+
+
+def table(verdicts: Sequence[Verdict]) -> str:
+    """Markdown: per problem and level one table, the error in each cell, and why runs ended."""
+    lines = []
+    for problem, level, names, marks, cells in _groups(verdicts):
+        lines += [f"**{problem.name}, {level}** (error {problem.error})", ""]
+        lines += [f"| {problem.distortion} | " + " | ".join(f"{mark:g}" for mark in marks) + " | why it ended |"]
+        lines += ["|---" * (len(marks) + 2) + "|"]
+        for name in names:
+            row = [cells[name, mark] for mark in marks]
+            shown = [f"{v.verdict} {_percent(v.error)}".strip() for v in row]
+            reason = next((v.reason for v in row if v.reason), "")
+            lines.append(f"| {name} | " + " | ".join(shown) + f" | {reason} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:
+    """All verdicts, one per line."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Verdict)])
+        writer.writeheader()
+        writer.writerows(asdict(verdict) for verdict in verdicts)
+
+
+COLOURS = {"accurate": "#4c9f70", "stable": "#e9d985", "stalled": "#b8b8b8", "failed": "#c8553d"}
+
+
+def draw(verdicts: Sequence[Verdict], path: Path) -> None:
+    """The map: one panel per problem and level, references downwards, distortion to the right."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    groups = list(_groups(verdicts))
+    rows = math.ceil(len(groups) / 2)
+    figure, axes = plt.subplots(rows, 2, figsize=(11, 2.6 * rows), squeeze=False)
+    for axis in axes.flat[len(groups) :]:
+        axis.remove()
+    for axis, (problem, level, names, marks, cells) in zip(axes.flat, groups, strict=False):
+        for i, name in enumerate(names):
+            for k, mark in enumerate(marks):
+                cell = cells[name, mark]
+                axis.add_patch(plt.Rectangle((k, i), 1, 1, facecolor=COLOURS[cell.verdict], edgecolor="white"))
+                axis.text(k + 0.5, i + 0.5, _percent(cell.error), ha="center", va="center", fontsize=7)
+        axis.set(
+            xlim=(0, len(marks)), ylim=(len(names), 0), title=f"{problem.name}, {level}", xlabel=problem.distortion
+        )
+        axis.set_xticks(np.arange(len(marks)) + 0.5, [f"{mark:g}" for mark in marks])
+        axis.set_yticks(np.arange(len(names)) + 0.5, names)
+        axis.tick_params(length=0)
+    handles = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in COLOURS.values()]
+    figure.legend(handles, COLOURS, ncols=len(COLOURS), loc="upper center", frameon=False)
+    figure.tight_layout(rect=(0, 0, 1, 0.97))
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def main(argv: Sequence[str] | None = None) -> list[Verdict]:
+    """Run the map; every verdict."""
+    known = [problem.name for problem in PROBLEMS]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="coarse resolution and three references only")
+    parser.add_argument("--only", nargs="+", choices=known, default=known, help="problems to run")
+    parser.add_argument("--output", type=Path, default=Path("runs/distortion"))
+    args = parser.parse_args(argv)
+    wp.config.log_level = wp.LOG_WARNING
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    chosen = [problem for problem in PROBLEMS if problem.name in args.only]
+    return run(chosen, QUICK if args.quick else tuple(REFERENCES), args.quick, args.output)
+
+
+if __name__ == "__main__":
+    main()
