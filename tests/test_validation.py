@@ -49,7 +49,7 @@ def test_all_cases_are_found_and_say_where_they_come_from():
     assert {"amplification", "bar", "piston", "punch", "spinning_plate", "twisting_column"} <= set(found)
     for name, case in found.items():
         assert case.name == name, f"module {name} holds the case {case.name}; give both one name"
-        assert len(case.title) > 10 and len(case.source) > 10
+        assert len(case.title) > 10 and case.source
         assert "\n" not in case.title + case.source
     assert list(found) == names()
 
