@@ -1,293 +1,276 @@
-"""Linear stability of one step of the scheme, read from the step itself.
+"""Maps of linear stability: which weights, dilations, options and steps hold.
 
     python -m warp_eulsph.validation.stability [--quick] [--output DIR]
 
-The scheme's own ``step`` is differentiated about a state at rest, so that whatever the scheme does is in the result and
-no formula of it is repeated here. What the figures say is in docs/stability.md.
+writes ``stability.csv``, one row per figure, and ``stability_map.png``. The radii are those of the library's own step
+(``stability_step.py``), the rates those of its operators (``stability_rates.py``). What the figures say is in
+docs/stability.md.
 """
 
+import argparse
+import csv
+import logging
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
-import numpy as np
+import warp as wp
 
-from .. import fields
-from ..geometry import box
-from ..materials import Material, NeoHookean
+from ..scheme.dissipation import Upwind
 from ..scheme.lax_wendroff import LaxWendroff
-from ..scheme.reference import Always, Never, ReferencePolicy
-from ..scheme.time_step import TimeStep
-from ..simulation import Body, Simulation
-from ..weights import CubicSpline, Weight
+from ..scheme.pair_areas import PairAreas
+from ..scheme.reference import Always
+from ..scheme.smoothing import LinearExact, NeighbourAverage
+from ..weights import CubicSpline, QuinticSpline, Weight, WendlandC2, WendlandC4
+from .stability_rates import rates
+from .stability_step import RESOLVED, Point, growth, largest_cfl, spectral_radius
 
-# Step of the five-point difference quotient. Positions are in spacings, velocities in wave speeds: its errors are
-# about (1e-3)^4 from the fifth derivative and 1e-16/1e-3 from round-off.
-DIFFERENCE = 1e-3
-# A Jacobian is good to about 1e-12. Neutral modes come in pairs (x += Δt v), whose eigenvalue 1 splits by the square
-# root of that: growth below 1e-5 per step is not told from none.
-RESOLVED = 1e-5
+__all__ = ["RESOLVED", "Point", "Study", "growth", "largest_cfl", "scan", "spectral_radius"]
+
+_log = logging.getLogger(__name__)
+
+#: The limits of M12 that are linear: all of the correction (M11; iterations to round-off), and none.
+CLOSED, PLAIN = PairAreas(kappa=math.inf, iterations=100), None
+OPTIONS = {
+    "default": LaxWendroff(),
+    "epsilon 0.5": LaxWendroff(dissipation=Upwind(0.5)),
+    "epsilon 0.25": LaxWendroff(dissipation=Upwind(0.25)),
+    "epsilon 0.1": LaxWendroff(dissipation=Upwind(0.1)),
+    "epsilon 2": LaxWendroff(dissipation=Upwind(2.0)),
+    "no dissipation": LaxWendroff(dissipation=None),
+    "theta 0.1": LaxWendroff(smoothing=LinearExact(0.1)),
+    "theta 0.25": LaxWendroff(smoothing=LinearExact(0.25)),
+    "theta 0.5": LaxWendroff(smoothing=LinearExact(0.5)),
+    "neighbour average": LaxWendroff(smoothing=NeighbourAverage()),
+    "neighbour average, no dissipation": LaxWendroff(smoothing=NeighbourAverage(), dissipation=None),
+}
+#: Of these, where the Jacobian is large.
+FEW = ("default", "epsilon 0.5", "epsilon 0.25", "theta 0.5")
+WEIGHTS: dict[str, tuple[Weight, Sequence[float]]] = {
+    "CubicSpline": (CubicSpline(), (1.1, 1.2, 1.3, 1.5)),
+    "QuinticSpline": (QuinticSpline(), (1.1, 1.3)),
+    "WendlandC2": (WendlandC2(), (1.3, 1.5, 1.7)),
+    "WendlandC4": (WendlandC4(), (1.5, 1.7)),
+}
+#: Particles across a bounded cube: enough for its middle to see no face in 1-D and 2-D.
+BOUNDED = {1: 24, 2: 7, 3: 4}
+PERIODIC = {1: 16, 2: 8, 3: 6}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Point:
-    """One state at rest, and the scheme that steps it. Lengths are in spacings: the lattice has spacing 1.
+@dataclass(frozen=True)
+class Study:
+    """One figure to be found.
 
     Args:
-        dim: dimension.
-        across: particles along each axis.
-        periodic: whether the body fills a periodic box; otherwise it is a cube with free faces.
-        jitter: largest random displacement of a particle along each axis, in [0, 0.5).
-        strain: uniform strain of the state along each axis, one number or ``dim``; only periodic bodies hold it. The
-            lattice is that of the reference, so Eulerian it is the strained one that has spacing 1.
-        reference: Never() for total Lagrangian, Always() for Eulerian.
-        scheme: options of the scheme.
-        weight: SPH weight.
-        dilation: smoothing length in spacings.
-        cfl: Δt in spacings over the wave speed measured in the reference.
-        surface: as ``Body.surface``; 0.0 with a jitter, a strain and ``PairAreas(math.inf, …)`` is in equilibrium.
-        material: its law; the speed of its pressure waves scales out.
-        seed: of the jitter.
+        group: which part of the map it belongs to.
+        name: of the option that varies.
+        point: where it is measured.
+        measure: name of what is measured, a key of ``MEASURES``.
     """
 
-    dim: int = 2
-    across: int = 8
-    periodic: bool = True
-    jitter: float = 0.0
-    strain: float | tuple[float, ...] = 0.0
-    reference: ReferencePolicy = Never()
-    scheme: LaxWendroff = LaxWendroff()
-    weight: Weight = CubicSpline()
-    dilation: float = 1.3
-    cfl: float = 0.4
-    surface: float | None = None
-    material: Material = NeoHookean(density=1.0, young=1.0, poisson=0.3)
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if self.reference not in (Never(), Always()):
-            raise ValueError(f"reference must be Never() or Always(), got {self.reference}: others are no single step")
-        if np.any(self.strain) and not self.periodic:
-            raise ValueError(f"only a periodic body holds a strain without loads, got {self.strain} for a bounded one")
-
-    @property
-    def translates(self) -> bool:
-        """Every particle sees the same arrangement, so that one of them tells the Jacobian."""
-        return self.periodic and self.jitter == 0.0
+    group: str
+    name: str
+    point: Point
+    measure: str
 
 
-class Step:
-    """The step of a point's scheme as a map of deviations from the state at rest.
-
-    A deviation is an array (n, c) with, per particle, those of x (in spacings), v (in wave speeds), F and the surface
-    vector. Total Lagrangian, x and the surface vector feed back on nothing and are left
-    out.
-
-    Attributes:
-        simulation: the simulation that steps.
-        speed: wave speed measured in the reference [spacings per second].
-    """
-
-    def __init__(self, point: Point):
-        self.point, dim = point, point.dim
-        size = (float(point.across),) * dim
-        x, volume = box((0.0,) * dim, size, 1.0, jitter=point.jitter, seed=point.seed)
-        body = Body(x=x, volume=volume, material=point.material, surface=point.surface)
-        self.simulation = Simulation(
-            body,
-            reference=point.reference,
-            scheme=point.scheme,
-            time_step=TimeStep(fixed=1.0),
-            weight=point.weight,
-            dilation=point.dilation,
-            periodic=size if point.periodic else None,
-        )
-        self.moving = not point.reference.fixed
-        self._strain()
-        shapes = {"x": (dim,), "v": (dim,), "F": (dim, dim), "surface": (dim,)}
-        self.shapes = {name: shapes[name] for name in fields.STATE if self.moving or name in ("v", "F")}
-        self._rest = self._read()
-
-    @property
-    def columns(self) -> int:
-        """Reals per particle of a deviation."""
-        return sum(math.prod(shape) for shape in self.shapes.values())
-
-    def __call__(self, deviation: np.ndarray) -> np.ndarray:
-        """Deviation after one step from the state at rest plus ``deviation``, both (n, columns)."""
-        self._write(deviation)
-        self.take()
-        return self.deviation()
-
-    def take(self) -> None:
-        """One step of the simulation from where it is."""
-        # A simulation just built does not refresh its reference before the first step; this state is never just built.
-        self.simulation.stepper.steps = 1
-        self.simulation.step()
-
-    def deviation(self) -> np.ndarray:
-        """The present state less that at rest, (n, columns)."""
-        now = self._read()
-        parts = [(now[name] - self._rest[name]) / self._scale(name) for name in self.shapes]
-        return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
-
-    def scale(self, factor: float) -> None:
-        """Shrink or stretch the present deviation, the potentials of the pair areas with it."""
-        now = {name: getattr(self.simulation.stepper.U, name).numpy().copy() for name in self._rest}
-        for name, rest in self._rest.items():
-            getattr(self.simulation.stepper.U, name).assign(rest + factor * (now[name] - rest))
-        for potential in self._potentials():
-            potential.assign(factor * potential.numpy())
-
-    def speeds(self) -> np.ndarray:
-        """Velocities of the present state in wave speeds, (n, dim)."""
-        return self.simulation.v / self.speed
-
-    def start(self, deviation: np.ndarray) -> None:
-        """Put the simulation at the state at rest plus ``deviation``."""
-        self._write(deviation)
-
-    def _strain(self) -> None:
-        """Bring the body to the strain of the point, keeping the lattice of the reference, and read the time step."""
-        simulation, point = self.simulation, self.point
-        stepper, flux, configuration = simulation.stepper, simulation.stepper.flux, simulation.stepper.configuration
-        stretch = 1.0 + np.broadcast_to(np.asarray(point.strain, dtype=float), (point.dim,))
-        stepper.U.F.assign(np.broadcast_to(np.diag(stretch), (len(simulation.x), point.dim, point.dim)))
-        if self.moving:
-            # The lattice of unit cells is the strained one: its particles were smaller before.
-            for field in (simulation.particles.V0, simulation.particles.mass):
-                field.assign(field.numpy() / stretch.prod())
-            configuration.refresh(stepper.U)
-        flux.wave_speeds(stepper.U.F, configuration.fields, simulation.clock.fields)
-        self.speed = float(simulation.clock.fields.rate.numpy()[0])
-        simulation.clock.option = TimeStep(fixed=point.cfl / self.speed)
-        flux.compute(stepper.U.F, configuration.fields)
-        self.stress = flux.fields.Q.numpy()[0].copy()
-        self.modulus = simulation.particles.mass.numpy()[0] / configuration.fields.V.numpy()[0] * self.speed**2
-
-    def _scale(self, name: str) -> float:
-        return self.speed if name == "v" else 1.0
-
-    def _read(self) -> dict[str, np.ndarray]:
-        return {name: getattr(self.simulation.stepper.U, name).numpy().copy() for name in fields.STATE}
-
-    def _write(self, deviation: np.ndarray) -> None:
-        U, first = self.simulation.stepper.U, 0
-        for name, rest in self._rest.items():
-            state = rest
-            if name in self.shapes:
-                last = first + math.prod(self.shapes[name])
-                state = rest + self._scale(name) * deviation[:, first:last].reshape(rest.shape)
-                first = last
-            getattr(U, name).assign(state)
-        for potential in self._potentials():
-            potential.zero_()
-
-    def _potentials(self) -> list[Any]:
-        """What the correction keeps from step to step: the pair areas' first guess (M11), zero at rest."""
-        solver = getattr(self.simulation.stepper.stabiliser, "solver", None)
-        return [] if solver is None else [solver.psi]
-
-    def response(self, particle: int, column: int) -> np.ndarray:
-        """Column of the Jacobian, (n, columns): five-point central difference."""
-        deviation = np.zeros((len(self.simulation.x), self.columns))
-        result = np.zeros_like(deviation)
-        for factor, weight in ((2.0, -1.0), (1.0, 8.0), (-1.0, -8.0), (-2.0, 1.0)):
-            deviation[particle, column] = factor * DIFFERENCE
-            result += weight / (12.0 * DIFFERENCE) * self(deviation)
-        return result
+def _growth_rate(point: Point) -> float:
+    """ln |λ| per time dx/c: what a user of another Δt would see."""
+    return math.log(spectral_radius(point)) / point.cfl
 
 
-def eigenvalues(point: Point) -> np.ndarray:
-    """All eigenvalues of the point's step about its state at rest.
-
-    A lattice in a periodic box is translated into itself, so the response to one particle's deviations gives, by a
-    discrete Fourier transform, one small matrix per wave vector (Bloch); elsewhere the whole Jacobian is formed.
-
-    Raises:
-        ValueError: a point that is not at rest; its forces move it within the step.
-    """
-    step = Step(point)
-    check_rest(step)
-    return np.linalg.eigvals(symbols(step) if point.translates else jacobian(step)).ravel()
+MEASURES = {
+    "largest cfl": largest_cfl,
+    "growth per step": lambda point: spectral_radius(point) - 1.0,
+    "growth rate dx/c": _growth_rate,
+    "power iteration, growth rate dx/c": lambda point: growth(point, 600) / point.cfl,
+    "frequency dx/c": lambda point: rates(point).frequency,
+    "damping dx/c": lambda point: rates(point).damping,
+}
 
 
-def check_rest(step: Step) -> None:
-    """Raise ValueError unless the state stays as it is for one step."""
-    moved = np.abs(step(np.zeros((len(step.simulation.x), step.columns)))).max()
-    if moved > 1e-9:
-        raise ValueError(
-            f"the state must be at rest, but one step changes it by {moved:.3g}; a strained body needs a lattice, or "
-            "surface=0.0 and a correction that closes the pair areas"
-        )
+@dataclass(frozen=True)
+class Result:
+    """A figure found; ``seconds`` it took."""
+
+    study: Study
+    value: float
+    seconds: float = field(compare=False, default=0.0)
+
+    def row(self) -> dict[str, Any]:
+        """Flat, for a table."""
+        point = self.study.point
+        return {
+            "group": self.study.group,
+            "name": self.study.name,
+            "dim": point.dim,
+            "body": "periodic" if point.periodic else "bounded",
+            "across": point.across,
+            "jitter": point.jitter,
+            "strain": point.strain,
+            "reference": type(point.reference).__name__,
+            "weight": type(point.weight).__name__,
+            "dilation": point.dilation,
+            "cfl": point.cfl,
+            "measure": self.study.measure,
+            "value": f"{self.value:.6g}",
+        }
 
 
-def jacobian(step: Step) -> np.ndarray:
-    """Jacobian of the step, (n c, n c)."""
-    n, c = len(step.simulation.x), step.columns
-    columns = [step.response(a, j).ravel() for a in range(n) for j in range(c)]
-    return np.stack(columns, axis=1)
+def studies(quick: bool) -> Iterator[Study]:
+    """The map's figures; ``quick`` leaves out 3-D bodies with faces, jitter and most weights."""
+    dims = (1, 2) if quick else (1, 2, 3)
+    bodies = [Point(dim=dim, across=BOUNDED[dim], periodic=False) for dim in dims]
+    boxes = [Point(dim=dim, across=PERIODIC[dim]) for dim in (1, 2, 3)]
+    for point in [*bodies, *boxes]:
+        for jitter in (0.0,) if quick else (0.0, 0.2):
+            there = replace(point, jitter=jitter)
+            yield Study("rates", "acoustic", there, "frequency dx/c")
+            yield Study("rates", "dissipation", there, "damping dx/c")
+    for point in [*bodies, *boxes]:
+        for name, scheme in OPTIONS.items():
+            if point.periodic or point.dim == 1 or name in FEW[: 1 if quick else None]:
+                yield Study("options", name, replace(point, scheme=scheme), "largest cfl")
+    for point in bodies[:2]:
+        if not quick:
+            yield Study("jitter", "default", replace(point, jitter=0.2), "largest cfl")
+            yield Study("Eulerian", "default", replace(point, reference=Always()), "largest cfl")
+    for cfl in (0.2, 0.4, 0.6, 0.8, 1.0, 1.2):
+        for point in [*bodies, *boxes] if cfl in (0.4, 0.6, 1.0) else [*bodies[:2], *boxes]:
+            yield Study("growth", "default", replace(point, cfl=cfl), "growth per step")
+    for name, (weight, dilations) in WEIGHTS.items():
+        for dilation in (1.2, 1.3, 1.5) if quick else dilations:
+            if not quick or name == "CubicSpline":
+                across = max(BOUNDED[2], math.ceil(2.0 * weight.support * dilation))
+                point = Point(dim=2, across=min(across, 8), periodic=False, weight=weight, dilation=dilation)
+                yield Study("weights", name, point, "largest cfl")
+    yield from _strained(quick)
 
 
-def symbols(step: Step) -> np.ndarray:
-    """Matrices (across, …, c, c) that the step multiplies plane waves with, wave vector by wave vector."""
-    point, c = step.point, step.columns
-    lattice = (point.across,) * point.dim
-    responses = np.stack([step.response(0, j).reshape(*lattice, c) for j in range(c)], axis=-1)
-    return np.fft.fftn(responses, axes=tuple(range(point.dim)))
+def _strained(quick: bool) -> Iterator[Study]:
+    """Uniform strains in a moving reference: M5 alone, all of M11, the default."""
+    for dim in (1, 2) if quick else (1, 2, 3):
+        for dilation in (1.2, 1.3, 1.5):
+            for strain in (-0.1, -0.03, 0.03, 0.1):
+                across = max(PERIODIC[dim], math.ceil(4.0 * dilation) + 1)
+                point = Point(dim=dim, across=across, dilation=dilation, strain=strain, reference=Always())
+                plain, closed = LaxWendroff(correction=PLAIN), LaxWendroff(correction=CLOSED)
+                yield Study("strained", "M5 alone", replace(point, scheme=plain), "growth rate dx/c")
+                yield Study("strained", "M11", replace(point, scheme=closed), "growth rate dx/c")
+                if dim < 3 and not quick:
+                    yield Study("strained", "default", point, "power iteration, growth rate dx/c")
 
 
-def spectral_radius(point: Point) -> float:
-    """Largest |λ| of one step of the library's scheme about a state at rest.
-
-    The step is differentiated by five-point central differences of the simulation itself, with a fixed Δt (a step that
-    follows the wave speeds changes at first order, but multiplies rates that are zero at rest). Neutral modes (rigid
-    motions, and F and x that exert no force) have λ = 1, in pairs that round-off splits: values below 1 + ``RESOLVED``
-    mean no growth. Schemes that are not differentiable at rest, M12 with a finite κ, are for ``growth``; without a
-    stress at rest the pair areas exert nothing at first order and any κ gives the same.
-    """
-    return float(np.abs(eigenvalues(point)).max())
-
-
-def growth(point: Point, steps: int = 400, seed: int = 0) -> float:
-    """Growth of ln |v| per step in the second half of ``steps`` nonlinear steps from a random deviation of 1e-6.
-
-    For what has no Jacobian (M12 is homogeneous of degree one in a small deviation, but not linear) or too large a
-    one. Only v is measured, because neutral modes of x and F may drift; the deviation is shrunk whenever v has grown
-    tenfold. Not above zero means that nothing grows.
-    """
-    step, amplitude = Step(point), 1e-6
-    step.start(amplitude * np.random.default_rng(seed).standard_normal((len(step.simulation.x), step.columns)))
-    logarithms, scaled = [], 0.0
-    for _ in range(steps):
-        step.take()
-        size = float(np.sqrt(np.mean(np.square(step.speeds()))))
-        if size == 0.0:
-            return -math.inf
-        logarithms.append(math.log(size) + scaled)
-        if size > 10.0 * amplitude:
-            step.scale(amplitude / size)
-            scaled += math.log(size / amplitude)
-    half = np.array(logarithms[steps // 2 :])
-    return float(np.polyfit(np.arange(len(half)), half, 1)[0])
+def scan(wanted: Iterable[Study]) -> list[Result]:
+    """Find every figure, in order; progress goes to the log."""
+    results = []
+    for study in wanted:
+        start = time.perf_counter()
+        value = float(MEASURES[study.measure](study.point))
+        results.append(Result(study, value, time.perf_counter() - start))
+        row = results[-1].row()
+        _log.info("%s (%.1f s)", ", ".join(str(entry) for entry in row.values()), results[-1].seconds)
+    return results
 
 
-def largest_cfl(point: Point, cfls: Sequence[float] = tuple(np.arange(0.1, 2.65, 0.1)), within: float = 0.02) -> float:
-    """Largest CFL up to which no mode grows: the first of ``cfls`` that fails, then bisected ``within``; 0 if none."""
+def write(results: Sequence[Result], path: Path) -> None:
+    """The figures as comma-separated values, one per row."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, fieldnames=list(results[0].row()))
+        table.writeheader()
+        table.writerows(result.row() for result in results)
 
-    def holds(cfl: float) -> bool:
-        return spectral_radius(replace(point, cfl=float(cfl))) <= 1.0 + RESOLVED
 
-    good = 0.0
-    for cfl in cfls:
-        if not holds(cfl):
-            bad = float(cfl)
-            break
-        good = float(cfl)
-    else:
-        return good
-    while good > 0.0 and bad - good > within:
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if holds(middle) else (good, middle)
-    return good
+def draw(results: Sequence[Result], path: Path) -> None:
+    """Four panels: growth over CFL; largest CFL over ε, and over dilation; growth of strained bodies over dilation."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(10, 7.5))
+    _draw_growth(axes[0, 0], _of(results, "growth"))
+    _draw_dissipation(axes[0, 1], _of(results, "options"))
+    _draw_weights(axes[1, 0], _of(results, "weights"))
+    _draw_strained(axes[1, 1], _of(results, "strained"))
+    figure.tight_layout()
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def _of(results: Sequence[Result], group: str) -> list[Result]:
+    return [result for result in results if result.study.group == group]
+
+
+def _body(point: Point) -> str:
+    return f"{point.dim}-D {'periodic' if point.periodic else 'bounded'}"
+
+
+def _line(point: Point) -> dict[str, Any]:
+    return {"color": f"C{point.dim - 1}", "ls": "--" if point.periodic else "-", "marker": "o", "ms": 3}
+
+
+def _draw_growth(axes: Any, results: Sequence[Result]) -> None:
+    for point in dict.fromkeys(replace(result.study.point, cfl=1.0) for result in results):
+        own = [result for result in results if replace(result.study.point, cfl=1.0) == point]
+        cfl = [result.study.point.cfl for result in own]
+        axes.semilogy(cfl, [max(result.value, 1e-8) for result in own], label=_body(point), **_line(point))
+    axes.axhspan(1e-8, RESOLVED, color="0.9")
+    axes.set(xlabel="CFL", ylabel="growth per step, |λ| − 1", title="default scheme at rest (grey: none)")
+    axes.legend(fontsize=7)
+
+
+def _draw_dissipation(axes: Any, results: Sequence[Result]) -> None:
+    bare = {replace(result.study.point, scheme=LaxWendroff()) for result in results}
+    for point in sorted(bare, key=_body):
+        own = [result for result in results if replace(result.study.point, scheme=LaxWendroff()) == point]
+        pairs = [(r.study.point.scheme.dissipation, r.value) for r in own if r.study.point.scheme.smoothing is None]
+        found = sorted((0.0 if option is None else option.epsilon, value) for option, value in pairs)
+        axes.plot(*zip(*found, strict=True), label=_body(point), **_line(point))
+    axes.set(xlabel="ε of the dissipation (M9)", ylabel="largest CFL", title="no smoothing, cubic spline, dilation 1.3")
+    axes.legend(fontsize=7)
+
+
+def _draw_weights(axes: Any, results: Sequence[Result]) -> None:
+    for name in dict.fromkeys(result.study.name for result in results):
+        own = [result for result in results if result.study.name == name]
+        axes.plot([r.study.point.dilation for r in own], [r.value for r in own], marker="o", ms=3, label=name)
+    axes.axhline(0.4, color="0.6", lw=1)
+    axes.set(xlabel="dilation", ylabel="largest CFL", title="2-D bounded, ε = 1; grey: 0.4")
+    axes.legend(fontsize=7)
+
+
+def _draw_strained(axes: Any, results: Sequence[Result]) -> None:
+    styles = {"M5 alone": ("-", "o"), "M11": (":", "s"), "default": ("--", "^")}
+    for dim in (1, 2, 3):
+        for name, (line, marker) in styles.items():
+            own = [r for r in results if (r.study.name, r.study.point.dim, r.study.point.strain) == (name, dim, 0.1)]
+            if own:
+                dilation, rate = [r.study.point.dilation for r in own], [max(r.value, 1e-5) for r in own]
+                axes.semilogy(
+                    dilation, rate, ls=line, marker=marker, ms=3, color=f"C{dim - 1}", label=f"{dim}-D {name}"
+                )
+    axes.set(xlabel="dilation", ylabel="growth rate · dx/c", title="Eulerian, 10 % strain in every direction")
+    axes.legend(fontsize=7)
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Scan, write, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="few bodies with faces, few weights; a minute or two")
+    parser.add_argument("--output", type=Path, default=Path("runs/stability"))
+    args = parser.parse_args(argv)
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    wp.config.log_level = wp.LOG_WARNING
+    args.output.mkdir(parents=True, exist_ok=True)
+    results = scan(studies(args.quick))
+    write(results, args.output / "stability.csv")
+    draw(results, args.output / "stability_map.png")
+    _log.info("%d figures: %s", len(results), args.output)
+
+
+if __name__ == "__main__":
+    main()
