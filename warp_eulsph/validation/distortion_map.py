@@ -4,7 +4,7 @@
 
 Problems × references × resolutions; each run passes through increasing distortion and is judged at every mark:
 *accurate* (error below 5 %), *stable* (it goes on), or *failed*, with the reason: a particle inverted or not finite,
-energy gained out of nothing, an error above 100 %. *Stalled* runs stayed stable until their steps had become too small
+energy gained out of nothing, an error above 50 %. *Stalled* runs stayed stable until their steps had become too small
 to go on. Writes ``distortion.md``, ``distortion.csv`` and ``distortion_map.png`` after every problem.
 """
 
@@ -37,9 +37,10 @@ from .solids import MaterialPoint
 
 _log = logging.getLogger(__name__)
 
-ACCURATE, FAILED_ERROR = 0.05, 1.0
+ACCURATE = 0.05
+WRONG = 0.5  # a state that lost half of what it should be; a run that forgets its stress errs by 100 % at most
 GAIN = 0.1  # energy out of nothing, over the present energy: what failing runs exceed within a few steps
-MOST_STEPS = 60_000
+MOST_STEPS = 30_000
 
 #: Name -> reference, and options of the simulation.
 REFERENCES: dict[str, tuple[ReferencePolicy, dict[str, Any]]] = {
@@ -168,8 +169,8 @@ PROBLEMS = (
         "shear",
         "shear",
         "of F or stress",
-        (16, 32),
-        {gamma: gamma / shear.RATE for gamma in (0.5, 1.0, 2.0, 5.0, 10.0)},
+        (12, 24),
+        {gamma: gamma / shear.RATE for gamma in (0.5, 1.0, 2.0, 5.0, 8.0)},
         0.01,
         start_shear,
     ),
@@ -234,8 +235,8 @@ def _grade(simulation: Simulation, start: float, error: float | None) -> tuple[s
     gained = energy["total"] - start - energy["external"] - energy["constraint"]
     if gained > GAIN * energy["total"]:
         return "failed", f"energy gained: {100.0 * gained / energy['total']:.3g} % of what there is"
-    if error is not None and error > FAILED_ERROR:
-        return "failed", "error above 100 %"
+    if error is not None and error > WRONG:
+        return "failed", f"error above {100.0 * WRONG:g} %"
     return ("accurate" if error is not None and error < ACCURATE else "stable"), ""
 
 
@@ -267,7 +268,8 @@ def _groups(verdicts: Sequence[Verdict]) -> Iterator[tuple[Problem, int, list[st
     problems = {problem.name: problem for problem in PROBLEMS}
     for name, level in dict.fromkeys((v.problem, v.level) for v in verdicts):
         cells = {(v.reference, v.distortion): v for v in verdicts if (v.problem, v.level) == (name, level)}
-        references, marks = (list(dict.fromkeys(key[k] for key in cells)) for k in (0, 1))
+        references = list(dict.fromkeys(reference for reference, _ in cells))
+        marks = list(dict.fromkeys(mark for _, mark in cells))
         yield problems[name], level, references, marks, cells
 
 
@@ -325,7 +327,7 @@ def draw(verdicts: Sequence[Verdict], path: Path) -> None:
     handles = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in COLOURS.values()]
     figure.legend(handles, COLOURS, ncols=len(COLOURS), loc="upper center", frameon=False)
     figure.tight_layout(rect=(0, 0, 1, 0.97))
-    figure.savefig(path, dpi=100)
+    figure.savefig(path, dpi=80)
     plt.close(figure)
 
 
