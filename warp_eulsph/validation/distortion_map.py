@@ -25,6 +25,7 @@ from .. import (
     Every,
     LaxWendroff,
     Never,
+    PairAreas,
     ReferencePolicy,
     Simulation,
     SurfaceVectors,
@@ -51,6 +52,7 @@ REFERENCES: dict[str, tuple[ReferencePolicy, dict[str, Any]]] = {
     "every 2": (Every(2), {}),
     "criterion": (WhenDistorted(1.2), {}),
     "always": (Always(), {}),
+    "always, M11": (Always(), {"scheme": LaxWendroff(correction=PairAreas(kappa=math.inf))}),
     "always, M10": (Always(), {"scheme": LaxWendroff(correction=SurfaceVectors())}),
 }
 QUICK = ("never", "every 10", "always")
