@@ -36,6 +36,7 @@ from .materials import (
     TaitLiquid,
 )
 from .operators.values import Linear, Shepard
+from .scheme.balance import Balance
 from .scheme.dissipation import Upwind
 from .scheme.health import UnstableError
 from .scheme.lax import Lax
@@ -47,6 +48,7 @@ from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
 from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.time_step import TimeStep
+from .scheme.verlet import Verlet
 from .simulation import Body, Simulation
 from .space import Space
 from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, WendlandC2, WendlandC4, WendlandC6
@@ -54,6 +56,7 @@ from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, Wendland
 __all__ = [
     "Always",
     "Antisymmetry",
+    "Balance",
     "Bar",
     "Body",
     "BodyForce",
@@ -98,6 +101,7 @@ __all__ = [
     "UnstableError",
     "Upwind",
     "Velocity",
+    "Verlet",
     "Wall",
     "Weight",
     "WendlandC2",

@@ -24,7 +24,7 @@ class Field(NamedTuple):
 PARTICLES = {
     "mass": Field("real", "kg", "mass, fixed (per metre of depth in 2-D, per square metre in 1-D)"),
     "V0": Field("real", "m^d", "initial volume"),
-    "h": Field("real", "m", "smoothing length, dilation times spacing"),
+    "h": Field("real", "m", "initial smoothing length, dilation times spacing"),
     "spacing": Field("real", "m", "initial particle spacing"),
     "share": Field("real", "-", "1; 0 for ghosts, which energies and momenta leave out"),
     "body": Field("int", "-", "number of the body; only particles of one body are neighbours"),
@@ -37,14 +37,16 @@ STATE = {
 }
 REFERENCE = {
     "x": Field("vec", "m", "position in the reference"),
+    "balanced": Field("vec", "m", "position that M4 and M5 take pair vectors from; x unless balanced (M13)"),
+    "h": Field("real", "m", "smoothing length in the reference, which follows J_k^(1/d)"),
     "V": Field("real", "m^d", "volume in the reference, det(F_k) V0"),
-    "L": Field("mat", "-", "gradient correction (M3)"),
+    "L": Field("mat", "-", "gradient correction (M3), not symmetric where positions are balanced (M13)"),
     "F": Field("mat", "-", "deformation gradient of the reference, F_k"),
     "row": Field("real", "kg/m^(d+2)", "sum of m_b g_ab over the neighbours (M7)"),
 }
 FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
-    "Pi": Field("mat", "Pa", "stress times correction, Q L (M5)"),
+    "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5)"),
     "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
     "impedance": Field("real", "kg/(m^2 s)", "density times pressure-wave speed, both measured in the reference (M9)"),
     "shear_impedance": Field(

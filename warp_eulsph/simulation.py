@@ -17,6 +17,7 @@ from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff
 from .scheme.reference import Always, Configuration, ReferencePolicy
 from .scheme.time_step import DeviceClock, TimeStep
+from .scheme.verlet import Verlet
 from .space import Space
 from .weights import CubicSpline, Weight
 
@@ -91,7 +92,7 @@ class Simulation:
         bodies: one or several ``Body``; particles of different bodies are never neighbours.
         boundaries: conditions, imposed in this order.
         reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian.
-        scheme: LaxWendroff options, or those of the one-step Lax.
+        scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax.
         time_step: TimeStep options.
         weight: SPH weight.
         dilation: smoothing length over spacing.
@@ -110,7 +111,7 @@ class Simulation:
         *,
         boundaries: Sequence[Boundary] = (),
         reference: ReferencePolicy = Always(),
-        scheme: LaxWendroff | Lax = LaxWendroff(),
+        scheme: Verlet | LaxWendroff | Lax = Verlet(),
         time_step: TimeStep = TimeStep(),
         weight: Weight = CubicSpline(),
         dilation: float = 1.3,

@@ -21,16 +21,11 @@ def make_average(weight: Weight, space: Space, components: int) -> Any:
     (1-D): below ``CUTOFF`` the particle keeps its own value.
     """
     real, vec, row = space.real, space.vec, space.row(components)
-    Particles, Reference, Neighbours = (
-        structure(space, "Particles"),
-        structure(space, "Reference"),
-        neighbour_structure(space),
-    )
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     separation, W_of, corrected = difference(space), value(weight, space), corrected_value(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def average(
-        particles: Particles,
         reference: Reference,
         near: Neighbours,
         alpha: wp.array(dtype=real),
@@ -39,14 +34,14 @@ def make_average(weight: Weight, space: Space, components: int) -> Any:
         out: wp.array(dtype=row),
     ):
         a = wp.tid()
-        x_a, h_a = reference.x[a], particles.h[a]
+        x_a, h_a = reference.x[a], reference.h[a]
         alpha_a, beta_a = alpha[a], beta[a]
         total = row()
         share = real(0.0)
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             offset = separation(x_a, reference.x[b], near.box)
-            W = W_of(wp.length(offset), real(0.5) * (h_a + particles.h[b]))
+            W = W_of(wp.length(offset), real(0.5) * (h_a + reference.h[b]))
             N_b = reference.V[b] * corrected(alpha_a, beta_a, offset, W)
             total += f[b] * N_b
             share += N_b

@@ -31,13 +31,13 @@ def make_pair_sums(weight: Weight, space: Space) -> Any:
     def pair_sums(particles: Particles, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
         a = wp.tid()
         x_a = reference.x[a]
-        h_a = particles.h[a]
+        h_a = reference.h[a]
         K_a = mat()
         row = real(0.0)
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
-            g = g_of(wp.length(xi), real(0.5) * (h_a + particles.h[b]))
+            g = g_of(wp.length(xi), real(0.5) * (h_a + reference.h[b]))
             near.g[k] = g
             K_a += wp.outer(xi, xi) * (reference.V[b] * g)
             row += particles.mass[b] * g

@@ -11,7 +11,10 @@ from ..space import Space, difference
 
 @functools.cache
 def make_gradient(space: Space, components: int) -> Any:
-    """Kernel: ∇f_a = Σ_b V_b g_ab (f_b − f_a) ⊗ L_a ξ, for rows f of ``components`` reals (M4)."""
+    """Kernel: ∇f_a = Σ_b V_b g_ab (f_b − f_a) ⊗ ξ L_a, for rows f of ``components`` reals (M4).
+
+    ξ joins the balanced positions of the particles (M13), their positions where nothing is balanced.
+    """
     row, row_gradient = space.row(components), space.row_gradient(components)
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     separation = difference(space)
@@ -19,12 +22,12 @@ def make_gradient(space: Space, components: int) -> Any:
     @wp.kernel(module="unique", enable_backward=False)
     def gradient(reference: Reference, near: Neighbours, f: wp.array(dtype=row), out: wp.array(dtype=row_gradient)):
         a = wp.tid()
-        x_a = reference.x[a]
+        x_a = reference.balanced[a]
         f_a = f[a]
         sums = row_gradient()
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
-            xi = separation(reference.x[b], x_a, near.box)
+            xi = separation(reference.balanced[b], x_a, near.box)
             sums += wp.outer(f[b] - f_a, xi * (reference.V[b] * near.g[k]))
         out[a] = sums @ reference.L[a]
 

@@ -17,16 +17,11 @@ from .values import Values, corrected_value, make_value_correction
 def make_interpolate(weight: Weight, space: Space, components: int, transpose: bool) -> Any:
     """Kernel: (N f)_a = Σ_b N_b(x_a) f_b, or with ``transpose`` (Nᵀ f)_a = Σ_c N_a(x_c) f_c, a itself included."""
     real, vec, row = space.real, space.vec, space.row(components)
-    Particles, Reference, Neighbours = (
-        structure(space, "Particles"),
-        structure(space, "Reference"),
-        neighbour_structure(space),
-    )
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     separation, W_of, corrected = difference(space), value(weight, space), corrected_value(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def interpolate(
-        particles: Particles,
         reference: Reference,
         near: Neighbours,
         alpha: wp.array(dtype=real),
@@ -35,13 +30,13 @@ def make_interpolate(weight: Weight, space: Space, components: int, transpose: b
         out: wp.array(dtype=row),
     ):
         a = wp.tid()
-        x_a, h_a, V_a = reference.x[a], particles.h[a], reference.V[a]
+        x_a, h_a, V_a = reference.x[a], reference.h[a], reference.V[a]
         alpha_a, beta_a = alpha[a], beta[a]
         total = f[a] * (V_a * alpha_a * W_of(real(0.0), h_a))
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             offset = separation(x_a, reference.x[b], near.box)
-            W = W_of(wp.length(offset), real(0.5) * (h_a + particles.h[b]))
+            W = W_of(wp.length(offset), real(0.5) * (h_a + reference.h[b]))
             if wp.static(transpose):
                 total += f[b] * (V_a * corrected(alpha[b], beta[b], -offset, W))
             else:
@@ -73,14 +68,14 @@ def make_mass_diagonals(weight: Weight, space: Space) -> Any:
         consistent: wp.array(dtype=real),
     ):
         a = wp.tid()
-        x_a, h_a, V_a = reference.x[a], particles.h[a], reference.V[a]
+        x_a, h_a, V_a = reference.x[a], reference.h[a], reference.V[a]
         N = V_a * alpha[a] * W_of(real(0.0), h_a)
         lumped_a = particles.mass[a] * N
         consistent_a = lumped_a * N
         for k in range(near.start[a], near.start[a + 1]):
             c = near.index[k]
             offset = separation(reference.x[c], x_a, near.box)
-            W = W_of(wp.length(offset), real(0.5) * (h_a + particles.h[c]))
+            W = W_of(wp.length(offset), real(0.5) * (h_a + reference.h[c]))
             N = V_a * corrected(alpha[c], beta[c], offset, W)
             lumped_a += particles.mass[c] * N
             consistent_a += particles.mass[c] * N * N
@@ -111,7 +106,7 @@ class Interpolation:
         self.values, self.space, self.weight, self.device = values, space, weight, device
         self.alpha = wp.zeros(n, dtype=space.real, device=device)
         self.beta = wp.zeros(n, dtype=space.vec, device=device)
-        self._arguments = [particles, reference, near, self.alpha, self.beta]
+        self.particles, self._arguments = particles, [reference, near, self.alpha, self.beta]
 
     def refresh(self) -> None:
         """Corrections of the present reference."""
@@ -136,4 +131,4 @@ class Interpolation:
     def mass_diagonals(self, lumped: wp.array, consistent: wp.array) -> None:
         """M^L_aa and M^C_aa [kg] of the mass matrices lumped and consistent with N, (n,) each."""
         kernel = make_mass_diagonals(self.weight, self.space)
-        wp.launch(kernel, len(lumped), [*self._arguments, lumped, consistent], device=self.device)
+        wp.launch(kernel, len(lumped), [self.particles, *self._arguments, lumped, consistent], device=self.device)

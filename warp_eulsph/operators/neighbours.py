@@ -112,7 +112,7 @@ class NeighbourLists:
     Args:
         space: dimension, precision, periodicity.
         weight: its support radius bounds the lists.
-        h: smoothing lengths [m], (n,).
+        h: smoothing lengths [m], (n,); those of the moment count at each ``build``.
         body: body numbers, (n,).
         box: lengths of the periodic box [m], zero where open.
         device: Warp device.
@@ -122,14 +122,8 @@ class NeighbourLists:
         self.space, self.device = space, device
         self.h, self.body, self.box = h, body, space.vec(*box)
         n = len(h)
-        lengths = h.numpy()
-        self.support, self.h_max = weight.support, float(lengths.max())
-        for i, length in enumerate(box):
-            if 0.0 < length < 2.0 * self.support * self.h_max:
-                raise ValueError(
-                    f"periodic box length along axis {i} must be at least twice the support radius "
-                    f"({2 * self.support * self.h_max:.6g} m), got {length:.6g} m; enlarge the box or refine"
-                )
+        self.support = weight.support
+        self._measure()
         side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
         self.grid = wp.HashGrid(
             side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
@@ -151,6 +145,16 @@ class NeighbourLists:
         """Directed pairs (a, b) in the lists; reads the device."""
         return int(self.rows.start[-1:].numpy()[0])
 
+    def _measure(self) -> None:
+        """Largest smoothing length; reads the device."""
+        self.h_max = float(self.h.numpy().max())
+        for i, length in enumerate(self.box):
+            if 0.0 < length < 2.0 * self.support * self.h_max:
+                raise ValueError(
+                    f"periodic box length along axis {i} must be at least twice the support radius "
+                    f"({2 * self.support * self.h_max:.6g} m), got {length:.6g} m; enlarge the box or refine"
+                )
+
     def _reserve(self, pairs: int) -> None:
         self.rows.index = wp.zeros(pairs, dtype=wp.int32, device=self.device)
         self.rows.g = wp.zeros(pairs, dtype=self.space.real, device=self.device)
@@ -158,6 +162,7 @@ class NeighbourLists:
     def build(self, x: wp.array) -> None:
         """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.g`` is left to be computed."""
         n = len(x)
+        self._measure()
         wp.launch(_make_pad(self.space), n, [x, self.box, self.padded], device=self.device)
         cell = self.support * self.h_max * QUERY_MARGIN
         self.grid.build(self.padded, cell, groups=self.body)

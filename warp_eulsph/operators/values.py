@@ -43,16 +43,11 @@ def make_value_correction(weight: Weight, space: Space, linear: bool) -> Any:
     The sums include a itself, directions without neighbours keep β = 0.
     """
     real, vec, mat = space.real, space.vec, space.mat
-    Particles, Reference, Neighbours = (
-        structure(space, "Particles"),
-        structure(space, "Reference"),
-        neighbour_structure(space),
-    )
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     separation, W_of, invert = difference(space), value(weight, space), corrected_inverse(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def value_correction(
-        particles: Particles,
         reference: Reference,
         near: Neighbours,
         alpha: wp.array(dtype=real),
@@ -60,7 +55,7 @@ def make_value_correction(weight: Weight, space: Space, linear: bool) -> Any:
     ):
         a = wp.tid()
         x_a = reference.x[a]
-        h_a = particles.h[a]
+        h_a = reference.h[a]
         M_0 = reference.V[a] * W_of(real(0.0), h_a)
         M_1 = vec()
         M_2 = mat()
@@ -68,7 +63,7 @@ def make_value_correction(weight: Weight, space: Space, linear: bool) -> Any:
             b = near.index[k]
             # In units of h, so that the cut-off of the inverse is dimensionless
             offset = separation(x_a, reference.x[b], near.box) / h_a
-            VW = reference.V[b] * W_of(wp.length(offset) * h_a, real(0.5) * (h_a + particles.h[b]))
+            VW = reference.V[b] * W_of(wp.length(offset) * h_a, real(0.5) * (h_a + reference.h[b]))
             M_0 += VW
             M_1 += offset * VW
             M_2 += wp.outer(offset, offset) * VW

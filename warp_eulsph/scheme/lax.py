@@ -8,10 +8,10 @@ import warp as wp
 
 from ..fields import clock_structure, structure
 from ..space import Space
+from .balance import Balance
 from .dissipation import Upwind
 from .health import check
 from .lax_wendroff import LaxWendroffStepper
-from .pair_areas import PairAreas
 from .smoothing import NeighbourAverage, Smoothing
 
 
@@ -28,7 +28,7 @@ class Lax:
 
     smoothing: Smoothing = NeighbourAverage()
     dissipation: Upwind | None = Upwind()
-    correction: Any = PairAreas()
+    correction: Any = Balance()
     limiter: ClassVar[None] = None
 
     def build(self, *parts: Any) -> "LaxStepper":
@@ -94,7 +94,7 @@ class LaxStepper(LaxWendroffStepper):
         self._gradients(U)  # M4: ∇_k v, ∇_k F
         self._sense(U)  # d of M9
         self._stress(U)  # M1: Q = P F_kᵀ / J_k
-        self._sum_forces(U, 0.0)  # M5, M9, M11, M12
+        self._sum_forces(U, U.v, 0.0)  # M5, M9
         self._smooth(U, other)  # M6 or M7: S(U)
         self._note_smoothing(U, other)
         self._predict(U, other, 1.0)  # U^{n+1} = S(Uⁿ) + Δt (rates of Uⁿ), x^{n+1} = xⁿ + Δt vⁿ

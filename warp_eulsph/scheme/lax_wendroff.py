@@ -13,12 +13,12 @@ from ..linalg import cofactor, inverse
 from ..operators.divergence import make_divergence
 from ..operators.gradient import make_gradient
 from ..space import Space
+from .balance import Balance
 from .dissipation import Upwind, UpwindForces
 from .flux import Flux
 from .health import check
 from .ledger import Ledger
 from .limiter import FluxCorrectedTransport, MassDiffusion
-from .pair_areas import PairAreas
 from .reference import Configuration, ReferencePolicy
 from .sensor import SensorField
 from .smoothing import Smoothing
@@ -28,20 +28,21 @@ from .time_step import DeviceClock
 
 @dataclass(frozen=True)
 class LaxWendroff:
-    """Options of the scheme; the defaults are the combination that held in every case measured (docs/method.md).
+    """Options of the paper's scheme (M8): explicit midpoint with a smoothed half step. It needs CFL ≤ 0.4 in 3-D.
 
     Args:
-        smoothing: S of the half step; None is the identity (explicit midpoint), which never gained energy at CFL 0.4;
-            NeighbourAverage() is the paper's. Neither it nor LinearExact() is safe in bounded bodies.
+        smoothing: S of the half step; None is the identity, which never gained energy at CFL 0.4; NeighbourAverage()
+            is the paper's. Neither it nor LinearExact() is safe in bounded bodies.
         dissipation: M9; None leaves zero-energy modes undamped.
-        correction: what makes a moving reference stable (M10, M11, M12); None is the plain dual form, which pairs up.
-            Not used with a fixed reference, where it is zero unless the bodies came with surface vectors.
+        correction: what makes a moving reference stable: Balance() (M13), SurfaceVectors() (M10) or PairAreas() (M11,
+            M12); None is the plain dual form, which pairs up in tension. Not used with a fixed reference, where it is
+            zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
     """
 
     smoothing: Smoothing | None = None
     dissipation: Upwind | None = Upwind()
-    correction: Any = PairAreas()
+    correction: Any = Balance()
     limiter: FluxCorrectedTransport | None = None
 
     def build(self, *parts: Any) -> "LaxWendroffStepper":
@@ -82,38 +83,46 @@ def _make_predict(space: Space) -> Any:
 
 
 @functools.cache
-def _make_correct(space: Space) -> Any:
-    """Kernel: the full step of v, F, x and the surface vectors (M8); ``reaction`` keeps the free velocity."""
-    real, mat = space.real, space.mat
-    Particles, State, Forces = structure(space, "Particles"), structure(space, "State"), structure(space, "Forces")
-    Reference, Clock, invert, cof = (
-        structure(space, "Reference"),
-        clock_structure(space),
-        inverse(space),
-        cofactor(space),
-    )
+def _make_kick(space: Space) -> Any:
+    """Kernel: v^{n+1} (M8)."""
+    real, vec = space.real, space.vec
+    Particles, Forces, Clock = structure(space, "Particles"), structure(space, "Forces"), clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correct(
-        particles: Particles,
+    def kick(particles: Particles, forces: Forces, clock: Clock, v: wp.array(dtype=vec)):
+        a = wp.tid()
+        force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
+        v[a] = v[a] + force * (real(clock.dt[0]) / particles.mass[a])
+
+    return kick
+
+
+@functools.cache
+def _make_drift(space: Space) -> Any:
+    """Kernel: F, x and the surface vectors of ``state`` moved by ``fraction`` · Δt with velocity v (M8)."""
+    real, vec, mat = space.real, space.vec, space.mat
+    State, Reference, Clock = structure(space, "State"), structure(space, "Reference"), clock_structure(space)
+    invert, cof = inverse(space), cofactor(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def drift(
         reference: Reference,
-        half: State,
-        grad_v: wp.array(dtype=mat),
-        forces: Forces,
-        clock: Clock,
         state: State,
+        v: wp.array(dtype=vec),
+        grad_v: wp.array(dtype=mat),
+        clock: Clock,
+        fraction: wp.float64,
+        out: State,
     ):
         a = wp.tid()
-        dt = real(clock.dt[0])
-        force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
-        state.v[a] = state.v[a] + force * (dt / particles.mass[a])
-        dF = grad_v[a] @ reference.F[a] * dt
+        tau = real(fraction * clock.dt[0])
+        dF = grad_v[a] @ reference.F[a] * tau
         step = wp.identity(n=wp.static(space.dim), dtype=real) + dF @ invert(state.F[a])
-        state.surface[a] = cof(step) @ state.surface[a]
-        state.F[a] = state.F[a] + dF
-        state.x[a] = state.x[a] + half.v[a] * dt
+        out.surface[a] = cof(step) @ state.surface[a]
+        out.F[a] = state.F[a] + dF
+        out.x[a] = state.x[a] + v[a] * tau
 
-    return correct
+    return drift
 
 
 class LaxWendroffStepper:
@@ -179,14 +188,15 @@ class LaxWendroffStepper:
         self._gradients(U)  # M4: ∇_k v, ∇_k F
         self._sense(U)  # §5: d of vⁿ for both half steps, and the diffusion of Uⁿ
         self._stress(U)  # M1: Q = P F_kᵀ / J_k
-        self._sum_forces(U, 0.0)  # M5, M9, M11, M12
+        self._sum_forces(U, U.v, 0.0)  # M5, M9
         self._smooth(U, half)  # M6 or M7: S(U)
         self._predict(U, half, 0.5)  # M8: U^{n+½}
         self._impose(half, 0.5)
         self._velocity_gradient(half)  # M4
         self._stress(half)  # M1
-        self._sum_forces(half, 0.5)  # M5, M9, M11, M12
-        self._correct(U, half)  # M8: U^{n+1}, x^{n+1}
+        self._sum_forces(half, half.v, 0.5)  # M5, M9
+        self._kick(U)  # M8: v^{n+1}
+        self._drift(U, half.v, 1.0, U)  # M8: F^{n+1}, x^{n+1}
         self._limit(U)  # §5: U^{n+1} += d × diffusion
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
@@ -229,7 +239,7 @@ class LaxWendroffStepper:
     def _stress(self, state: Any) -> None:
         self.flux.compute(state.F, self.configuration.fields)
 
-    def _sum_forces(self, state: Any, fraction: float) -> None:
+    def _sum_forces(self, state: Any, v: wp.array, fraction: float) -> None:
         forces, configuration, options = self.forces, self.configuration, self.options
         divergence = [configuration.fields, configuration.near, self.flux.fields.Pi, forces.internal]
         wp.launch(make_divergence(self.space), self.n, divergence, device=self.device)
@@ -238,7 +248,7 @@ class LaxWendroffStepper:
             epsilon = options.dissipation.epsilon
             if options.dissipation.sensor is not None:
                 d = self.sensors[options.dissipation.sensor].d
-        self.stabiliser.compute(configuration, self.flux.fields, state.v, self.grad_v, epsilon, d, forces)
+        self.stabiliser.compute(configuration, self.flux.fields, v, self.grad_v, epsilon, d, forces)
         forces.external.zero_()
         for condition in self.conditions:
             condition.load(state, self.clock.fields, fraction, forces.external)
@@ -251,9 +261,13 @@ class LaxWendroffStepper:
         arguments = [self.particles, U, self.smoothed_F_k, self.grad_v, self.forces, self.clock.fields, fraction, half]
         wp.launch(_make_predict(self.space), self.n, arguments, device=self.device)
 
-    def _correct(self, U: Any, half: Any) -> None:
-        arguments = [self.particles, self.configuration.fields, half, self.grad_v, self.forces, self.clock.fields, U]
-        wp.launch(_make_correct(self.space), self.n, arguments, device=self.device)
+    def _kick(self, U: Any) -> None:
+        arguments = [self.particles, self.forces, self.clock.fields, U.v]
+        wp.launch(_make_kick(self.space), self.n, arguments, device=self.device)
+
+    def _drift(self, U: Any, v: wp.array, fraction: float, out: Any) -> None:
+        arguments = [self.configuration.fields, U, v, self.grad_v, self.clock.fields, fraction, out]
+        wp.launch(_make_drift(self.space), self.n, arguments, device=self.device)
 
     def _limit(self, U: Any) -> None:
         if self.limiter is not None:

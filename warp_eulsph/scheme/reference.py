@@ -81,6 +81,10 @@ class WhenDistorted(ReferencePolicy):
         return configuration.distortion(F) > self.ratio
 
 
+# The smoothing length follows the volume between these, so that one particle cannot make the lists endless.
+LEAST_GROWTH, LARGEST_GROWTH = 0.5, 2.0
+
+
 @functools.cache
 def _make_adopt(space: Space) -> Any:
     State, Particles, Reference = (
@@ -88,14 +92,18 @@ def _make_adopt(space: Space) -> Any:
         structure(space, "Particles"),
         structure(space, "Reference"),
     )
-    determinant = det(space)
+    real, determinant, power = space.real, det(space), 1.0 / space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def adopt(state: State, particles: Particles, reference: Reference):
         a = wp.tid()
         reference.x[a] = state.x[a]
         reference.F[a] = state.F[a]
-        reference.V[a] = determinant(state.F[a]) * particles.V0[a]
+        reference.balanced[a] = state.x[a]
+        J = determinant(state.F[a])
+        reference.V[a] = J * particles.V0[a]
+        growth = wp.pow(wp.max(J, real(0.0)), real(power))
+        reference.h[a] = particles.h[a] * wp.clamp(growth, real(LEAST_GROWTH), real(LARGEST_GROWTH))
 
     return adopt
 
@@ -160,7 +168,8 @@ class Configuration:
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
         self.fields = allocate(space, "Reference", n, device)
-        self.lists = NeighbourLists(space, weight, particles.h, particles.body, box, device)
+        wp.copy(self.fields.h, particles.h)
+        self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device)
         self.K = wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
@@ -172,7 +181,7 @@ class Configuration:
         return self.lists.rows
 
     def refresh(self, state: Any) -> None:
-        """Make ``state`` the reference: x_k, F_k, V_k, neighbours, pair weights, corrections (M3)."""
+        """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
         n = len(state.x)
         wp.launch(_make_adopt(self.space), n, [state, self.particles, self.fields], device=self.device)
         self.lists.build(self.fields.x)
@@ -193,7 +202,8 @@ class Configuration:
     def defect(self, surface: wp.array, out: wp.array) -> None:
         """``out`` ← e_a − s_a [m^(d−1)], (n,) of vec, for surface vectors s_a (M10).
 
-        e_a = Σ_b V_b G_a(x_b), the dual divergence (M5) of a unit stress: what a uniform stress would exert on a.
+        e_a = Σ_b V_b G_a(x_b), the dual divergence (M5) of a unit stress: what a uniform stress would exert on a. To be
+        asked for before positions are balanced (M13), as long as L is symmetric.
         """
         arguments = [self.fields, self.near, self.fields.L, out]
         wp.launch(make_divergence(self.space), len(out), arguments, device=self.device)

@@ -77,12 +77,12 @@ def modulation(space: Space, dimensionless: bool) -> Any:
 def _make_sense(space: Space, dimensionless: bool) -> Any:
     """Kernel: d_a from the largest |∇²v| of a and its neighbours, direction by direction."""
     real, vec, dim = space.real, space.vec, space.dim
-    Particles, Flux, Neighbours = structure(space, "Particles"), structure(space, "Flux"), neighbour_structure(space)
+    Reference, Flux, Neighbours = structure(space, "Reference"), structure(space, "Flux"), neighbour_structure(space)
     d_of = modulation(space, dimensionless)
 
     @wp.kernel(module="unique", enable_backward=False)
     def sense(
-        particles: Particles,
+        reference: Reference,
         near: Neighbours,
         flux: Flux,
         curvature: wp.array(dtype=vec),
@@ -95,7 +95,7 @@ def _make_sense(space: Space, dimensionless: bool) -> Any:
             largest = wp.max(largest, wp.abs(curvature[near.index[k]]))
         d_a = vec()
         for i in range(wp.static(dim)):
-            d_a[i] = d_of(X, largest[i], particles.h[a], flux.speed[a])
+            d_a[i] = d_of(X, largest[i], reference.h[a], flux.speed[a])
         d[a] = d_a
 
     return sense
@@ -117,5 +117,5 @@ class SensorField:
         """``d`` of velocities ``v`` [m/s] with gradients ``grad_v`` [1/s] and the wave speeds in ``flux``."""
         second = [configuration.fields, configuration.near, v, grad_v, self._curvature]
         wp.launch(make_second_derivative(self.space, self.space.dim), len(v), second, device=self.device)
-        arguments = [self.particles, configuration.near, flux, self._curvature, self.option.X, self.d]
+        arguments = [configuration.fields, configuration.near, flux, self._curvature, self.option.X, self.d]
         wp.launch(_make_sense(self.space, self.option.dimensionless), len(v), arguments, device=self.device)

@@ -1,0 +1,140 @@
+"""Balanced pair vectors (M13): what closes the sums of a moving reference without touching its conservation laws."""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import warp as wp
+
+from ..fields import neighbour_structure, structure
+from ..linalg import det, inverse
+from ..space import Space, difference
+from .dissipation import UpwindForces
+from .reference import Configuration
+
+# Share of the residual that a sweep corrects: the graph Laplacian over its diagonal has eigenvalues up to 2 (the
+# saw-tooth in 1-D), and a sweep must not overshoot: what is corrected too far repels in tension, pairs in compression.
+RELAXATION = 0.6
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Pair vectors of M4 and M5 from x̂ = x − ½ψ; ψ relaxes towards Σ_b ω_ab (ψ_a − ψ_b) = e_a − s_a (M13).
+
+    M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
+    it, whatever ψ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
+    which are the ones that pair particles up.
+
+    Args:
+        sweeps: relaxation sweeps per refresh, from ψ = 0; each costs a tenth of a step.
+        bound: largest |x̂ − x| over the particle's spacing.
+    """
+
+    sweeps: int = 3
+    bound: float = 0.1
+
+    def __post_init__(self) -> None:
+        if self.sweeps < 1:
+            raise ValueError(f"sweeps must be at least 1, got {self.sweeps}; correction=None balances nothing")
+        if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
+            raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.1 is the tested value")
+
+    def build(self, space: Space, particles: Any, bodies: list[range], device: Any) -> "BalancedPairs":
+        """Allocate."""
+        return BalancedPairs(self, space, particles, device)
+
+
+@functools.cache
+def _make_relax(space: Space) -> Any:
+    """Kernel: one sweep of damped Jacobi on Σ_b ω_ab (ψ_a − ψ_b) = d_a, ω_ab = V_a V_b g_ab (M13)."""
+    real, vec = space.real, space.vec
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def relax(
+        reference: Reference,
+        near: Neighbours,
+        defect: wp.array(dtype=vec),
+        psi: wp.array(dtype=vec),
+        out: wp.array(dtype=vec),
+    ):
+        a = wp.tid()
+        psi_a = psi[a]
+        diagonal = real(0.0)
+        residual = defect[a] / reference.V[a]
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            omega = reference.V[b] * near.g[k]
+            diagonal += omega
+            residual += (psi[b] - psi_a) * omega
+        if diagonal > real(0.0):
+            psi_a += residual * (real(RELAXATION) / diagonal)
+        out[a] = psi_a
+
+    return relax
+
+
+@functools.cache
+def _make_shift(space: Space) -> Any:
+    """Kernel: x̂ = x − ½ψ, not further than ``bound`` spacings (M13)."""
+    real, vec = space.real, space.vec
+    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def shift(particles: Particles, reference: Reference, psi: wp.array(dtype=vec), bound: real):
+        a = wp.tid()
+        away = psi[a] * real(0.5)
+        most = bound * particles.spacing[a]
+        if wp.length(away) > most:
+            away = away * (most / wp.length(away))
+        reference.balanced[a] = reference.x[a] - away
+
+    return shift
+
+
+@functools.cache
+def _make_correct(space: Space) -> Any:
+    """Kernel: L_a = (Σ_b V_b g_ab ξ ⊗ ξ̂)⁻¹ with ξ̂ between balanced positions: M4 stays exact for linear fields (M13).
+
+    Where the sum has lost half of det K, in neighbourhoods that are nearly flat, L_a stays that of M3.
+    """
+    real, mat = space.real, space.mat
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+    separation, invert, determinant = difference(space), inverse(space), det(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def correct_balanced(reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
+        a = wp.tid()
+        x_a, balanced_a = reference.x[a], reference.balanced[a]
+        sums = mat()
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            xi = separation(reference.x[b], x_a, near.box)
+            sums += wp.outer(xi, separation(reference.balanced[b], balanced_a, near.box)) * (reference.V[b] * near.g[k])
+        if determinant(sums) > real(0.5) * determinant(K[a]):
+            reference.L[a] = invert(sums)
+
+    return correct_balanced
+
+
+class BalancedPairs(UpwindForces):
+    """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
+
+    def __init__(self, option: Balance, space: Space, particles: Any, device: Any):
+        super().__init__(space, device)
+        self.option, self.particles, n = option, particles, len(particles.mass)
+        self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
+
+    def refresh(self, configuration: Configuration, state: Any) -> None:
+        """Balance the new reference."""
+        reference, near, n = configuration.fields, configuration.near, len(self.psi)
+        configuration.defect(state.surface, self.defect)
+        self.psi.zero_()
+        for _ in range(self.option.sweeps):
+            arguments = [reference, near, self.defect, self.psi, self._other]
+            wp.launch(_make_relax(self.space), n, arguments, device=self.device)
+            self.psi, self._other = self._other, self.psi
+        arguments = [self.particles, reference, self.psi, self.option.bound]
+        wp.launch(_make_shift(self.space), n, arguments, device=self.device)
+        wp.launch(_make_correct(self.space), n, [reference, near, configuration.K], device=self.device)
