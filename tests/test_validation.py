@@ -11,7 +11,7 @@ import pytest
 import warp_eulsph as es
 from warp_eulsph.cli import main
 from warp_eulsph.output import Figure
-from warp_eulsph.validation import Case, cases, command, names
+from warp_eulsph.validation import Case, load_all, command, names
 from warp_eulsph.validation.figures import difference, order
 from warp_eulsph.validation.history import at, series
 
@@ -26,7 +26,7 @@ def only(monkeypatch):
         made = {name: Case(name, f"title of {name}", f"source of {name}", run) for name, run in runs.items()}
         monkeypatch.setattr(command.registry, "names", lambda: list(made))
         monkeypatch.setattr(command.registry, "load", made.__getitem__)
-        monkeypatch.setattr(command.registry, "cases", lambda: made)
+        monkeypatch.setattr(command.registry, "load_all", lambda: made)
 
     return only
 
@@ -45,7 +45,7 @@ def unstable(quick):
 
 
 def test_all_cases_are_found_and_say_where_they_come_from():
-    found = cases()
+    found = load_all()
     assert {"amplification", "bar", "piston", "punch", "spinning_plate", "twisting_column"} <= set(found)
     for name, case in found.items():
         assert case.name == name, f"module {name} holds the case {case.name}; give both one name"

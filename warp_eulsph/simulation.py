@@ -137,7 +137,7 @@ class Simulation:
         materials = [(body.material, len(body.x)) for body in self.bodies]
         flux = Flux(self.space, materials, self.particles, self.device)
         configuration = Configuration(self.space, weight, self.particles, box, self.device)
-        self.clock = DeviceClock(self.space, time_step, self.device)
+        self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
         U = self._state(X)
         self.stepper = scheme.build(
             self.space,

@@ -148,7 +148,7 @@ class NeighbourLists:
     def _measure(self) -> None:
         """Largest smoothing length; reads the device."""
         self.h_max = float(self.h.numpy().max())
-        for i, length in enumerate(self.box):
+        for i, length in enumerate(float(length) for length in self.box):
             if 0.0 < length < 2.0 * self.support * self.h_max:
                 raise ValueError(
                     f"periodic box length along axis {i} must be at least twice the support radius "

@@ -17,6 +17,9 @@ from .reference import Configuration
 # saw-tooth in 1-D), and a sweep must not overshoot: what is corrected too far repels in tension, pairs in compression.
 RELAXATION = 0.6
 
+# A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
+OPENED = 1.0
+
 
 @dataclass(frozen=True)
 class Balance:
@@ -24,7 +27,8 @@ class Balance:
 
     M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
     it, whatever ψ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
-    which are the ones that pair particles up.
+    which are the ones that pair particles up. Where e_a − s_a exceeds the particle's own face, the body has opened
+    or closed: s_a becomes e_a, a free surface or none.
 
     Args:
         sweeps: relaxation sweeps per refresh, from ψ = 0; each costs a tenth of a step.
@@ -43,6 +47,23 @@ class Balance:
     def build(self, space: Space, particles: Any, bodies: list[range], device: Any) -> "BalancedPairs":
         """Allocate."""
         return BalancedPairs(self, space, particles, device)
+
+
+@functools.cache
+def _make_renew(space: Space) -> Any:
+    """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13)."""
+    real, vec = space.real, space.vec
+    face = float(space.dim - 1) / float(space.dim)
+    Reference = structure(space, "Reference")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def renew(reference: Reference, defect: wp.array(dtype=vec), surface: wp.array(dtype=vec)):
+        a = wp.tid()
+        if wp.length(defect[a]) > real(OPENED) * wp.pow(reference.V[a], real(face)):
+            surface[a] = surface[a] + defect[a]
+            defect[a] = vec()
+
+    return renew
 
 
 @functools.cache
@@ -130,6 +151,7 @@ class BalancedPairs(UpwindForces):
         """Balance the new reference."""
         reference, near, n = configuration.fields, configuration.near, len(self.psi)
         configuration.defect(state.surface, self.defect)
+        wp.launch(_make_renew(self.space), n, [reference, self.defect, state.surface], device=self.device)
         self.psi.zero_()
         for _ in range(self.option.sweeps):
             arguments = [reference, near, self.defect, self.psi, self._other]

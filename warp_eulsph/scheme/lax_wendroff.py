@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
@@ -44,6 +44,8 @@ class LaxWendroff:
     dissipation: Upwind | None = Upwind()
     correction: Any = Balance()
     limiter: FluxCorrectedTransport | None = None
+    #: Tested Courant number; the limit is 0.5 in bounded 3-D bodies.
+    cfl: ClassVar[float] = 0.4
 
     def build(self, *parts: Any) -> "LaxWendroffStepper":
         """The scheme at work; ``parts`` are the arguments of the stepper after its options."""

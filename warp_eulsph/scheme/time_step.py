@@ -19,20 +19,18 @@ class TimeStep:
     Particles with a poor neighbourhood (an L_a beyond those of jittered corners) ask for a smaller step.
 
     Args:
-        cfl: Courant number; 0.8 suits Verlet, whose limit is 1.1 to 1.3 in bounded bodies, 0.4 LaxWendroff.
+        cfl: Courant number; by default that of the scheme, 0.8 for Verlet and 0.4 for the others.
         growth: largest ratio of successive steps.
         fixed: a constant step [s] instead; steps before a target time are still shortened to hit it.
     """
 
-    cfl: float = 0.8
+    cfl: float | None = None
     growth: float = 1.1
     fixed: float | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.cfl) and self.cfl > 0.0):
-            raise ValueError(
-                f"cfl must be positive and finite, got {self.cfl}; 0.8 is tested with Verlet, 0.4 with the others"
-            )
+        if self.cfl is not None and not (math.isfinite(self.cfl) and self.cfl > 0.0):
+            raise ValueError(f"cfl must be positive and finite, got {self.cfl}; None takes the scheme's own")
         if not self.growth > 1.0:
             raise ValueError(f"growth must be greater than 1, got {self.growth}; 1.1 lets a step double in 8")
         if self.fixed is not None and not (math.isfinite(self.fixed) and self.fixed > 0.0):
@@ -79,10 +77,14 @@ def _make_tick(space: Space) -> Any:
 
 
 class DeviceClock:
-    """The clock arrays and the launches that move them; a step at the target time has Δt = 0 and changes nothing."""
+    """The clock arrays and the launches that move them; a step at the target time has Δt = 0 and changes nothing.
 
-    def __init__(self, space: Space, option: TimeStep, device: Any):
+    ``cfl`` is the scheme's own Courant number, for options that leave it open.
+    """
+
+    def __init__(self, space: Space, option: TimeStep, cfl: float, device: Any):
         self.space, self.option, self.device = space, option, device
+        self.cfl = cfl if option.cfl is None else option.cfl
         self.fields = clock_structure(space)()
         for name in ("t", "dt", "free_dt", "target"):
             setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
@@ -106,7 +108,7 @@ class DeviceClock:
     def choose(self) -> None:
         """Δt for the step to come, from ``rate``."""
         option = self.option
-        arguments = [self.fields, option.cfl, option.growth, option.fixed or 0.0]
+        arguments = [self.fields, self.cfl, option.growth, option.fixed or 0.0]
         wp.launch(_make_choose(self.space), 1, arguments, device=self.device)
 
     @property

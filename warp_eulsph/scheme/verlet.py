@@ -33,6 +33,8 @@ class Verlet:
     correction: Any = Balance()
     limiter: FluxCorrectedTransport | None = None
     smoothing: ClassVar[None] = None
+    #: Tested Courant number; the limit is 1.1 to 1.3 in bounded 3-D bodies.
+    cfl: ClassVar[float] = 0.8
 
     def build(self, *parts: Any) -> "VerletStepper":
         """The scheme at work; ``parts`` are the arguments of the stepper after its options."""

@@ -37,6 +37,6 @@ def load(name: str) -> Case:
     return importlib.import_module(f".cases.{name}", __package__).CASE
 
 
-def cases() -> dict[str, Case]:
+def load_all() -> dict[str, Case]:
     """All cases by name."""
     return {name: load(name) for name in names()}

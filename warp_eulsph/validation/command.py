@@ -70,7 +70,7 @@ def validate(names: Sequence[str], *, quick: bool = False, as_json: bool = False
     if unknown:
         print(_unknown(unknown[0], known), file=sys.stderr)
         return 2
-    chosen = [registry.load(name) for name in dict.fromkeys(names)] or list(registry.cases().values())
+    chosen = [registry.load(name) for name in dict.fromkeys(names)] or list(registry.load_all().values())
     if listing:
         for case in chosen:
             print(f"{case.name}\n    {case.title}\n    reference: {case.source}")
