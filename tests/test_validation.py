@@ -11,7 +11,7 @@ import pytest
 import warp_eulsph as es
 from warp_eulsph.cli import main
 from warp_eulsph.output import Figure
-from warp_eulsph.validation import Case, load_all, command, names
+from warp_eulsph.validation import Case, command, load_all, names
 from warp_eulsph.validation.figures import difference, order
 from warp_eulsph.validation.history import at, series
 
