@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ... import Always, Body, Motion, NeoHookean, Never, ReferencePolicy, Simulation
+from ... import Always, Body, Motion, NeoHookean, Never, PairAreas, ReferencePolicy, Simulation, Verlet
 from ...geometry import box
 from ...output import Figure
 from ..case import Case
@@ -65,12 +65,24 @@ def errors(simulation: Simulation, upper: Motion) -> dict[str, float]:
     }
 
 
+#: Name -> reference and scheme: the default, exactly closed pair areas without a bound on energy, total Lagrangian.
+FORMS = {
+    "eulerian": (Always(), Verlet()),
+    "eulerian_m11": (Always(), Verlet(correction=PairAreas(kappa=math.inf))),
+    "total_lagrangian": (Never(), Verlet()),
+}
+
+
 def run(quick: bool) -> Sequence[Figure]:
-    """Eulerian and total Lagrangian; quick to a shear of 1, else to 5. Aimed at: all within 5 %."""
-    n, shear = (12, 1.0) if quick else (16, 5.0)
+    """Aimed at: all within 5 %. Quick: to a shear of ½, where every form should hold.
+
+    Else to 5, where the Eulerian default is known to be outside: its stress is then many times the modulus, and M13
+    closes only the short waves of the defect that pairs particles up. M11 closes all of it.
+    """
+    n, shear = (12, 0.5) if quick else (16, 5.0)
     figures = []
-    for name, reference in (("eulerian", Always()), ("total_lagrangian", Never())):
-        simulation, upper = build(n, reference)
+    for name, (reference, scheme) in FORMS.items():
+        simulation, upper = build(n, reference, scheme=scheme)
         simulation.run(shear / RATE)
         now = errors(simulation, upper)
         figures += [
