@@ -42,6 +42,7 @@ ACCURATE = 0.05
 WRONG = 0.5  # a state that lost half of what it should be; a run that forgets its stress errs by 100 % at most
 GAIN = 0.1  # energy out of nothing, over the present energy: what failing runs exceed within a few steps
 MOST_STEPS = 30_000
+LEAST_STEP = 1e-4  # of the first: a hundredth is a shear of ten, total Lagrangian
 
 #: Name -> reference, and options of the simulation.
 REFERENCES: dict[str, tuple[ReferencePolicy, dict[str, Any]]] = {
@@ -213,15 +214,17 @@ def judge(problem: Problem, name: str, level: int) -> Iterator[Verdict]:
     reference, options = REFERENCES[name]
     run = problem.start(level, reference, **options)
     simulation, start = run.simulation, run.simulation.energy()["total"]
+    simulation.step()
+    least = LEAST_STEP * simulation.dt
     ended: tuple[str, str] | None = None
     for distortion, mark in problem.marks.items():
         error = None
         try:
             while ended is None and simulation.t < mark:
                 left = mark - simulation.t
-                simulation.run(mark if left < 1.5 * problem.frame else simulation.t + problem.frame)
-                error = run.error()
-                if simulation.steps > MOST_STEPS:
+                if _advance(simulation, mark if left < 1.5 * problem.frame else simulation.t + problem.frame, least):
+                    error = run.error()
+                else:
                     ended = ("stalled", f"{simulation.steps} steps taken, the last of {simulation.dt:.2g} s")
         except UnstableError as raised:
             what = str(raised).split(" has ")[-1].split(";")[0].split(", v =")[0].split(", must")[0]
@@ -232,6 +235,16 @@ def judge(problem: Problem, name: str, level: int) -> Iterator[Verdict]:
         )
         if verdict == "failed":
             ended = verdict, reason  # what follows is not worth its time
+
+
+def _advance(simulation: Simulation, until: float, least: float) -> bool:
+    """Step to the time ``until`` [s]; False once ``MOST_STEPS`` are taken, or steps are shorter than ``least`` [s]."""
+    while until - simulation.t > 2.0 * simulation.dt:
+        simulation.step()
+        if simulation.steps > MOST_STEPS or simulation.dt < least:
+            return False
+    simulation.run(until)
+    return True
 
 
 def _grade(simulation: Simulation, start: float, error: float | None) -> tuple[str, str]:
