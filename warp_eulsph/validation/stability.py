@@ -258,7 +258,7 @@ def _draw_dissipation(axes: Any, results: Sequence[Result]) -> None:
             axes.plot(*zip(*sorted(found), strict=True), label=_body(point) + midpoint * ", midpoint", **line)
     axes.axhline(Verlet.cfl, color="0.6", lw=1)
     axes.set(xlabel="ε of the dissipation (M9)", ylabel="largest CFL", title="cubic spline, dilation 1.3; grey: 0.8")
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=6, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.05))
 
 
 def _draw_weights(axes: Any, results: Sequence[Result]) -> None:
@@ -281,7 +281,8 @@ def _draw_strained(axes: Any, results: Sequence[Result]) -> None:
                     dilation, rate, ls=line, marker=marker, ms=3, color=f"C{dim - 1}", label=f"{dim}-D {name}"
                 )
     axes.set(xlabel="dilation", ylabel="growth rate · dx/c", title="Eulerian, 10 % strain in every direction")
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=6, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 0.05))
+    axes.set_ylim(bottom=1e-6)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
