@@ -251,8 +251,8 @@ def _draw_dissipation(axes: Any, results: Sequence[Result]) -> None:
             epsilon = 0.0 if scheme.dissipation is None else scheme.dissipation.epsilon
             family = (type(scheme), replace(result.study.point, scheme=Verlet()))
             families.setdefault(family, []).append((epsilon, result.value))
-    for (scheme, point), found in families.items():
-        midpoint = scheme is LaxWendroff
+    for (kind, point), found in families.items():
+        midpoint = kind is LaxWendroff
         if not (midpoint and point.periodic):
             line = {**_line(point), "alpha": 0.4} if midpoint else _line(point)
             axes.plot(*zip(*sorted(found), strict=True), label=_body(point) + midpoint * ", midpoint", **line)
