@@ -191,3 +191,14 @@ def test_float32_stays_near_float64():
     assert np.abs(single.x - double.x).max() < 1e-5
     assert np.abs(single.v - double.v).max() < 60.0 * 1e-5 * 5
     assert abs(single.energy()["residual"]) < 1e-5 * single.energy()["total"]
+
+
+def test_a_run_whose_steps_vanish_ends_with_a_message():
+    """One particle so flat that its waves ask for steps a millionth as long: an error instead of a run without end."""
+    simulation = es.Simulation(square(), reference=es.Never())
+    simulation.step(2)
+    F = simulation.F
+    F[7] *= 1e-8
+    simulation.stepper.U.F.assign(F)
+    with pytest.raises(es.UnstableError, match=r"particle 7 .*time step fell to .*try a smaller cfl"):
+        simulation.step(2)

@@ -23,6 +23,8 @@ from .weights import CubicSpline, Weight
 
 # A GPU runs this many steps between two looks at its clock; a step past the target or past a failure changes nothing.
 STEPS_BETWEEN_LOOKS = 8
+# A time step that fell below this share of the longest one means neighbourhoods that collapsed: the run would not end.
+STALLED = 1e-6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -153,6 +155,7 @@ class Simulation:
         self._check_neighbourhoods(X)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self._output: Any = None
+        self._longest_dt = 0.0
 
     # what a run does
 
@@ -313,14 +316,19 @@ class Simulation:
         return f"of body {name!r} at x = {np.array2string(x[particle], precision=6)} m"
 
     def _raise_if_bad(self) -> None:
-        particle = self.clock.bad
-        if particle is None:
-            return
-        x, v, F = self.x[particle], self.v[particle], self.F[particle]
-        if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
-            what = f"det F = {np.linalg.det(F):.4g}, must be positive"
+        particle, dt = self.clock.bad, self.clock.free_dt
+        self._longest_dt = max(self._longest_dt, dt)
+        if particle is not None:
+            x, v, F = self.x[particle], self.v[particle], self.F[particle]
+            if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
+                what = f"det F = {np.linalg.det(F):.4g}, must be positive"
+            else:
+                what = f"non-finite values, v = {v}, F = {F.tolist()}"
+        elif dt < STALLED * self._longest_dt:
+            particle = int(self.stepper.flux.fields.speed.numpy().argmax())
+            what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
         else:
-            what = f"non-finite values, v = {v}, F = {F.tolist()}"
+            return
         kept = "no snapshot was written"
         if getattr(self._output, "last", None) is not None:
             kept = f"the last good snapshot is {self._output.last}"

@@ -101,6 +101,11 @@ class DeviceClock:
         """Last time step [s]; reads the device."""
         return float(self.fields.dt.numpy()[0])
 
+    @property
+    def free_dt(self) -> float:
+        """Last time step [s] that no output time shortened; reads the device."""
+        return float(self.fields.free_dt.numpy()[0])
+
     def aim(self, target: float) -> None:
         """Set the time [s] that must be hit next."""
         self.fields.target.fill_(target)
