@@ -23,11 +23,11 @@ STORED = (0.0101, 0.0199)  # s, on the slope and at an extremum of the strain en
 TEN_TURNS = 20.0 * np.pi / SPIN  # s, were the plate rigid
 
 
-def build(n: int, reference: ReferencePolicy) -> Simulation:
+def build(n: int, reference: ReferencePolicy, **options: Any) -> Simulation:
     """The plate as n × n particles."""
     x, volume = box((-0.5, -0.5), (0.5, 0.5), 1.0 / n)
     velocity = SPIN * np.stack([-x[:, 1], x[:, 0]], axis=1)
-    return Simulation(Body(x=x, volume=volume, material=RUBBER, velocity=velocity), reference=reference)
+    return Simulation(Body(x=x, volume=volume, material=RUBBER, velocity=velocity), reference=reference, **options)
 
 
 def measure(simulation: Simulation, until: float, writer: Any = None) -> History:

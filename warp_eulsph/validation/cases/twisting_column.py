@@ -19,14 +19,14 @@ HEIGHT, END_TIME, FRAMES = 6.0, 0.11, 110
 SERIES = "twist_2"
 
 
-def build(n: int, reference: ReferencePolicy) -> Simulation:
+def build(n: int, reference: ReferencePolicy, **options: Any) -> Simulation:
     """The column, n particles across; the lowest layer is held."""
     spacing = 1.0 / n
     x, volume = box((-0.5, 0.0, -0.5), (0.5, HEIGHT, 0.5), spacing)
     spin = 105.0 * np.sin(np.pi * x[:, 1] / (2.0 * HEIGHT))
     velocity = np.stack([spin * x[:, 2], np.zeros(len(x)), -spin * x[:, 0]], axis=1)
     body = Body(x=x, volume=volume, material=RUBBER, velocity=velocity)
-    return Simulation(body, boundaries=[Fixed(lambda X: X[:, 1] < spacing)], reference=reference)
+    return Simulation(body, boundaries=[Fixed(lambda X: X[:, 1] < spacing)], reference=reference, **options)
 
 
 def turned(x: np.ndarray, z: np.ndarray) -> np.ndarray:
