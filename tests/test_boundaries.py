@@ -2,8 +2,6 @@
 
 import logging
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +12,8 @@ import warp_eulsph as es
 from warp_eulsph.boundaries import Antisymmetry, BodyForce, Pressure, Roller, Traction, Wall, mirror
 from warp_eulsph.materials import Bar
 from warp_eulsph.scheme.smoothing import NeighbourAverage
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
-from bar_exact import DENSITY, LENGTH, SPEED, WAVE_SPEED, YOUNG, bar_exact
+from warp_eulsph.validation.cases.bar import DENSITY, LENGTH, SPEED, WAVE_SPEED, YOUNG
+from warp_eulsph.validation.cases.bar import exact as bar_exact
 
 RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
 DX = 0.1

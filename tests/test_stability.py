@@ -1,16 +1,11 @@
 """What holds and what does not: the claims of docs/method.md on stability, each with its case."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
-from bar_exact import DENSITY, LENGTH, SPEED, YOUNG
+from warp_eulsph.validation.cases.bar import DENSITY, LENGTH, SPEED, YOUNG
 
 
 def spinning_plate(n, **options):

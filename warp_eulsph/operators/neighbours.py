@@ -123,7 +123,6 @@ class NeighbourLists:
         self.h, self.body, self.box = h, body, space.vec(*box)
         n = len(h)
         self.support = weight.support
-        self._measure()
         side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
         self.grid = wp.HashGrid(
             side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
@@ -146,7 +145,7 @@ class NeighbourLists:
         return int(self.rows.start[-1:].numpy()[0])
 
     def _measure(self) -> None:
-        """Largest smoothing length; reads the device."""
+        """Find the largest smoothing length of the moment; reads the device."""
         self.h_max = float(self.h.numpy().max())
         for i, length in enumerate(float(length) for length in self.box):
             if 0.0 < length < 2.0 * self.support * self.h_max:

@@ -31,7 +31,7 @@ class Balance:
     or closed: s_a becomes e_a, a free surface or none.
 
     Args:
-        sweeps: relaxation sweeps per refresh, from ψ = 0; each costs a tenth of a step.
+        sweeps: relaxation sweeps per refresh, from ψ = 0.
         bound: largest |x̂ − x| over the particle's spacing.
     """
 

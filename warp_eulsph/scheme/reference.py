@@ -168,7 +168,6 @@ class Configuration:
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
         self.fields = allocate(space, "Reference", n, device)
-        wp.copy(self.fields.h, particles.h)
         self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device)
         self.K = wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)

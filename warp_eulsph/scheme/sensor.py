@@ -109,8 +109,7 @@ class SensorField:
     """
 
     def __init__(self, option: Sensor, space: Space, particles: Any, device: Any):
-        self.option, self.space, self.particles, self.device = option, space, particles, device
-        n = len(particles.mass)
+        self.option, self.space, self.device, n = option, space, device, len(particles.mass)
         self.d, self._curvature = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(2))
 
     def compute(self, configuration: Configuration, flux: Any, v: wp.array, grad_v: wp.array) -> None:

@@ -8,6 +8,7 @@ equal.
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class StandingWave:
         return (KAPPA - 2 * MU / 3) * trace + MU * (strain + strain.transpose(0, 2, 1))
 
 
-def build(dim: int, n: int, reference: ReferencePolicy) -> tuple[Simulation, StandingWave]:
+def build(dim: int, n: int, reference: ReferencePolicy, **options: Any) -> tuple[Simulation, StandingWave]:
     """The unit square or cube, n particles along a side, with ghosts behind all of its faces; undeformed, moving."""
     x, volume = box([0.0] * dim, [1.0] * dim, 1 / n)
     wave = StandingWave(x)
@@ -75,7 +76,7 @@ def build(dim: int, n: int, reference: ReferencePolicy) -> tuple[Simulation, Sta
             point, normal = np.full(dim, position), np.eye(dim)[i] * (2 * position - 1)
             body, ghosts = mirror(body, point=point.tolist(), normal=normal.tolist(), depth=depth, image=image)
             conditions.append(ghosts)
-    return Simulation(body, boundaries=conditions, reference=reference, dilation=DILATION), wave
+    return Simulation(body, boundaries=conditions, reference=reference, dilation=DILATION, **options), wave
 
 
 def measure(simulation: Simulation, wave: StandingWave) -> dict[str, float]:
