@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import warp as wp
 
 from ..boundaries import Bound
-from ..fields import allocate, clock_structure, structure
+from ..fields import allocate, arrays, clock_structure, structure
 from ..linalg import cofactor, inverse
 from ..operators.divergence import make_divergence
 from ..operators.gradient import make_gradient
@@ -213,8 +213,25 @@ class LaxWendroffStepper:
             self.configuration.refresh(U)
             self._after_refresh()
 
+    def evolving(self) -> dict[str, wp.array]:
+        """Every array that a step reads before it writes it, by name: with ``steps`` what a checkpoint must hold."""
+        listed = [arrays(self.U, "State"), arrays(self.particles, "Particles"), {"reaction": self.forces.reaction}]
+        parts = [self.configuration, self.clock, self.flux, self.stabiliser, self.ledger]
+        listed += [part.evolving() for part in parts]
+        for i, condition in enumerate(self.conditions):
+            listed.append({f"Condition.{i}.{name}": array for name, array in condition.evolving().items()})
+        return {name: array for part in listed for name, array in part.items()}
+
+    def rebuild(self) -> None:
+        """Derive what the evolving arrays determine, after they were overwritten."""
+        self.configuration.rebuild()
+        self._refresh_derived()
+
     def _after_refresh(self) -> None:
         self.stabiliser.refresh(self.configuration, self.U)
+        self._refresh_derived()
+
+    def _refresh_derived(self) -> None:
         if self.limiter is not None:
             self.limiter.refresh()
         if self.smoothed_F_k is not self.configuration.fields.F:

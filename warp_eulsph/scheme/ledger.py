@@ -166,6 +166,10 @@ class Ledger:
         self._total.zero_()
         self.start = self.kinetic(U) + self.stored(U)
 
+    def evolving(self) -> dict[str, wp.array]:
+        """The accounts and the end of the last step booked, by name; with ``start`` what a checkpoint must hold."""
+        return {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+
     def open_limiter(self, U: Any) -> None:
         """Note the stored energies before the limiter changes ``U``."""
         self.flux.energy(U.F, self._dW_limited)

@@ -126,6 +126,10 @@ class SurfaceForces(Stabiliser):
         """The defect e_a − s_a of the new reference."""
         configuration.defect(state.surface, self.defect)
 
+    def evolving(self) -> dict[str, wp.array]:
+        """The defect: of the surface vectors at the last refresh, which are not kept."""
+        return {"SurfaceForces.defect": self.defect}
+
     def compute(
         self,
         configuration: Configuration,
