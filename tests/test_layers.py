@@ -13,10 +13,10 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
     {"space", "linalg"},
-    {"fields", "weights", "materials", "boundaries", "reduce"},
+    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "schedule", "diagnostics", "output", "geometry"},
+    {"simulation", "diagnostics", "output", "geometry"},
     {"validation"},
     {"cases", "cli", "__main__"},
 ]

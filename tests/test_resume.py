@@ -8,7 +8,6 @@ import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.output.checkpoint import decode, encode, take
-from warp_eulsph.output.description import describe, differences
 
 RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 REFERENCES = [es.Never(), es.Every(3), es.WhenDistorted(1.01), es.Always()]

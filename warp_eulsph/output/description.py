@@ -16,8 +16,8 @@ from ..simulation import Simulation
 def describe(simulation: Simulation) -> dict[str, Any]:
     """All options, bodies and conditions of a simulation, as JSON takes them.
 
-    Arrays are told by shape and SHA-256, functions by name, source and the values they enclose. Two simulations of equal
-    description take the same steps.
+    Arrays are told by shape and SHA-256, functions by name, source and the values they enclose. Two simulations of
+    equal description take the same steps, as long as no function reads what it does not enclose.
     """
     stepper = simulation.stepper
     conditions = zip(simulation.boundaries, simulation.conditions, strict=True)

@@ -54,13 +54,32 @@ class Manifest:
         self.entries: list[Entry] = []
 
     def read(self) -> None:
-        """Take the entries from the file, which may be absent.
+        """Take the entries from the file, which may be absent; an unfinished last line is not one yet.
 
         Raises:
             ValueError: a line is damaged; ``rebuild`` reads the snapshots instead.
         """
-        lines = self.path.read_text(encoding="utf-8").splitlines() if self.path.exists() else []
-        self.entries = [Entry.parse(line) for line in lines]
+        text = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+        self.entries = [Entry.parse(line) for line in text[: text.rfind("\n") + 1].splitlines()]
+
+    def load(self) -> None:
+        """``read``, or ``rebuild`` where the file is damaged or does not name the snapshots that are there.
+
+        Raises:
+            OSError: the disk refused; the file is as it was.
+        """
+        there = {f"snap/{path.name}": path.stat().st_size for path in (self.directory / "snap").glob("*.vtkhdf")}
+        try:
+            self.read()
+        except ValueError as error:
+            log.warning("%s is damaged and is made anew from the snapshots: %s", self.path, error)
+            self.rebuild()
+            return
+        if {entry.name: entry.bytes for entry in self.entries} != there:
+            log.warning("%s does not name the snapshots that are there and is made anew from them", self.path)
+            self.rebuild()
+        elif self.entries:
+            self.replace(self.entries)  # without an unfinished line
 
     def add(self, entry: Entry) -> None:
         """Append an entry; one of the same name is there already when a frame is written twice.
@@ -89,14 +108,20 @@ class Manifest:
         Raises:
             OSError: the disk refused; the file is as it was.
         """
+        damaged = self.examine()
+        self.replace(self.entries)
+        return damaged
+
+    def examine(self) -> list[str]:
+        """Take the entries from the snapshots themselves; names of those that do not open, which are left out."""
         found, damaged = [], []
         for path in sorted((self.directory / "snap").glob("*.vtkhdf")):
             try:
                 found.append(_examine(path))
             except (OSError, ValueError, KeyError) as error:
-                damaged.append(path.name)
+                damaged.append(f"snap/{path.name}")
                 log.warning("snapshot %s does not open and is left out: %s", path, error)
-        self.replace(found)
+        self.entries = found
         return damaged
 
     def damaged(self) -> list[str]:

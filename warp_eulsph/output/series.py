@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..simulation import Simulation
-from .atomic import move, replace_file
+from .atomic import replace_file
+from .directory import RunDirectory
 from .manifest import Manifest, entry_of
 from .snapshot import Frame, checked_precision, chosen_fields, collect, encode
 from .temporal import write_index
@@ -21,9 +22,9 @@ _GROWTH = 1.1
 class SnapshotWriter:
     """Writes ``snap/0000001200.vtkhdf`` for step 1200, its line in ``manifest.jsonl``, and the lists for ParaView.
 
-    ``run.vtkhdf.series`` lists the snapshots with their times; ``run.vtkhdf`` is one file over all of them, renewed when
-    a tenth more have come and by ``finish``. A new writer starts a new run: what an older one left in the directory
-    moves to ``abandoned/`` there.
+    ``run.vtkhdf.series`` lists the snapshots with their times; ``run.vtkhdf`` is one file over all of them, renewed
+    when a tenth more have come and by ``finish``. A new writer starts a new run: what an older one left in the
+    directory moves to ``abandoned/`` there.
 
     Attributes:
         manifest: of the snapshots written.
@@ -36,7 +37,7 @@ class SnapshotWriter:
         resume: go on after the snapshots that are there.
 
     Raises:
-        ValueError: unknown field or dtype, or with ``resume`` a damaged manifest.
+        ValueError: unknown field or dtype.
     """
 
     def __init__(
@@ -51,12 +52,12 @@ class SnapshotWriter:
         self.fields, self.dtype = chosen_fields(fields), checked_precision(dtype)
         self.manifest = Manifest(self.directory)
         self._indexed = 0
+        if not resume:
+            RunDirectory(self.directory).abandon()
         (self.directory / "snap").mkdir(parents=True, exist_ok=True)
         if resume:
-            self.manifest.read()
+            self.manifest.load()
             self._indexed = len(self.manifest.entries)
-        else:
-            abandon(self.directory, -1)
 
     @property
     def last(self) -> Path | None:
@@ -125,14 +126,3 @@ class SnapshotWriter:
     def _write_index(self) -> None:
         write_index(self.index, self.manifest.entries)
         self._indexed = len(self.manifest.entries)
-
-
-def abandon(directory: Path, step: int) -> Path | None:
-    """Move what a run left of steps after ``step`` into ``abandoned/``, and cut lists to what stays.
-
-    Returns:
-        The folder that holds it now; None if there was nothing.
-
-    Raises:
-        OSError: a move was refused; every file is in one of the two places.
-    """

@@ -58,13 +58,16 @@ FIELDS = {
     ),
     "density": SnapshotField(lambda d: (), "kg/m^3", "density", _density),
     "body": SnapshotField(
-        lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, lambda s: s.simulation.particles.body.numpy()
+        lambda d: (),
+        PARTICLES["body"].unit,
+        PARTICLES["body"].meaning,
+        lambda s: s.simulation.particles.body.numpy().copy(),
     ),
     "share": SnapshotField(
         lambda d: (),
         PARTICLES["share"].unit,
         PARTICLES["share"].meaning,
-        lambda s: s.simulation.particles.share.numpy(),
+        lambda s: s.simulation.particles.share.numpy().copy(),
     ),
 }
 
@@ -224,20 +227,52 @@ def read_snapshot(path: str | PathLike) -> Snapshot:
     import h5py
 
     with h5py.File(path, "r") as file:
-        missing = [key for key in ("time", "step", "dimension") if key not in file.attrs]
-        if missing or "VTKHDF/PointData" not in file:
-            raise ValueError(f"{path} is not a snapshot of this package: missing {missing or 'VTKHDF/PointData'}")
-        dim = int(file.attrs["dimension"])
-        fields, units = {}, {}
-        for name, dataset in file["VTKHDF/PointData"].items():
-            fields[name] = _natural(dataset[()], tuple(int(i) for i in dataset.attrs["shape"]))
-            units[name] = str(dataset.attrs["unit"])
-        x = file["VTKHDF/Points"][:, :dim]
-        return Snapshot(float(file.attrs["time"]), int(file.attrs["step"]), x, fields, units)
+        _check(path, file)
+        data = file["VTKHDF/PointData"]
+        fields = {name: _natural(dataset) for name, dataset in data.items()}
+        units = {name: str(dataset.attrs["unit"]) for name, dataset in data.items()}
+        return Snapshot(float(file.attrs["time"]), int(file.attrs["step"]), _positions(file), fields, units)
 
 
-def _natural(stored: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def read_units(path: str | PathLike) -> dict[str, str]:
+    """Fields of a snapshot besides the positions, with their units; raises like ``read_snapshot``."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        _check(path, file)
+        return {name: str(dataset.attrs["unit"]) for name, dataset in file["VTKHDF/PointData"].items()}
+
+
+def read_field(path: str | PathLike, name: str) -> np.ndarray:
+    """One field of a snapshot in its natural shape, ``x`` the positions; raises like ``read_snapshot``.
+
+    Raises:
+        KeyError: the snapshot has no such field.
+    """
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        _check(path, file)
+        if name == "x":
+            return _positions(file)
+        if name not in file["VTKHDF/PointData"]:
+            raise KeyError(f"{path} holds no {name!r}, only {['x', *file['VTKHDF/PointData']]}")
+        return _natural(file["VTKHDF/PointData"][name])
+
+
+def _check(path: str | PathLike, file: Any) -> None:
+    missing = [key for key in ("time", "step", "dimension") if key not in file.attrs]
+    if missing or "VTKHDF/PointData" not in file:
+        raise ValueError(f"{path} is not a snapshot of this package: missing {missing or 'VTKHDF/PointData'}")
+
+
+def _positions(file: Any) -> np.ndarray:
+    return file["VTKHDF/Points"][:, : int(file.attrs["dimension"])]
+
+
+def _natural(dataset: Any) -> np.ndarray:
     """Stored rows without the padding."""
+    stored, shape = dataset[()], tuple(int(i) for i in dataset.attrs["shape"])
     if len(shape) == 1:
         return stored[:, : shape[0]]
     if len(shape) == 2:
