@@ -227,12 +227,12 @@ def test_bad_meshes_are_named(tmp_path):
     with pytest.raises(ValueError, match="turn the same way"):
         mesh(write(tmp_path / "turned.vtk", points, turned), 0.1)
     closed = write(tmp_path / "closed.vtk", points, triangles)
-    with pytest.raises(ValueError, match="too coarse|at least one cell"):
+    with pytest.raises(ValueError, match=r"too coarse|at least one cell"):
         mesh(closed, 0.9)
-    with pytest.raises(FileNotFoundError, match="nowhere.stl"):
+    with pytest.raises(FileNotFoundError, match=r"nowhere\.stl"):
         mesh(tmp_path / "nowhere.stl", 0.1)
     (tmp_path / "noise.stl").write_bytes(b"no mesh")
-    with pytest.raises(ValueError, match="noise.stl: "):
+    with pytest.raises(ValueError, match=r"noise\.stl: "):
         mesh(tmp_path / "noise.stl", 0.1)
     import meshio
 

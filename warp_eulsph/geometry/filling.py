@@ -1,4 +1,4 @@
-"""Fillings: how particles repeat in space. One unit cell each, laid out so that the whole has its centre in the box's."""
+"""Fillings: how particles repeat in space, one unit cell each, laid out about the centre of the box."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass

@@ -36,7 +36,7 @@ class Relaxation:
     def relax(
         self, x: np.ndarray, volume: float, depth: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
     ) -> np.ndarray:
-        """Positions [m], (n, dim), from those given; ``depth`` as in ``Solid``. On the host, the same bits every run."""
+        """Positions [m], (n, dim), from those given; ``depth`` as in ``Solid``. On the host, to the same bits."""
         spacing = volume ** (1.0 / x.shape[1])
         x = x.copy()
         for _ in range(self.sweeps):

@@ -44,7 +44,7 @@ class Solid:
         """
         if not (np.isfinite(spacing) and spacing > 0.0):
             raise ValueError(f"{who}: spacing must be positive and finite, got {spacing} m")
-        x, _ = box(self.lower, self.upper, spacing, filling=filling)
+        x, _ = box(self.lower.tolist(), self.upper.tolist(), spacing, filling=filling)
         x = x[self.depth(x)[0] > ON_SURFACE * spacing]
         share = self.volume / max(len(x), 1) / spacing ** x.shape[1]
         if len(x) == 0 or not 1.0 / COARSE < share < COARSE:
