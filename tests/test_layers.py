@@ -18,7 +18,8 @@ LAYERS = [
     {"scheme", "contact"},
     {"simulation", "diagnostics", "output", "geometry"},
     {"validation"},
-    {"cases", "cli", "__main__"},
+    {"cases"},
+    {"commands", "cli", "__main__"},
 ]
 LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 # The front door shows rooms up to the simulation: those above may come in by it.

@@ -1,5 +1,24 @@
 """Shapes as particles."""
 
+from .filling import BodyCentred, Filling, Lattice, Staggered
 from .lattice import box, nodes
+from .mesh import Patch, mesh
+from .relaxation import Relaxation
+from .shapes import cylinder, disc, ring, sphere, tube
 
-__all__ = ["box", "nodes"]
+__all__ = [
+    "BodyCentred",
+    "Filling",
+    "Lattice",
+    "Patch",
+    "Relaxation",
+    "Staggered",
+    "box",
+    "cylinder",
+    "disc",
+    "mesh",
+    "nodes",
+    "ring",
+    "sphere",
+    "tube",
+]

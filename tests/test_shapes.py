@@ -1,0 +1,249 @@
+"""Shapes as particles: exact volumes, symmetry, evenness, mesh files, and errors that name the cause."""
+
+import numpy as np
+import pytest
+
+from warp_eulsph.geometry import (
+    BodyCentred,
+    Lattice,
+    Patch,
+    Relaxation,
+    Staggered,
+    box,
+    cylinder,
+    disc,
+    mesh,
+    ring,
+    sphere,
+    tube,
+)
+
+FILLINGS = [Lattice(), BodyCentred(), Staggered()]
+# shape -> (arguments, exact volume, centre)
+SHAPES = {
+    disc: (((1.0, 2.0), 1.0), np.pi, (1.0, 2.0)),
+    ring: (((0.0, -1.0), 0.5, 1.0), 0.75 * np.pi, (0.0, -1.0)),
+    sphere: (((1.0, 2.0, 3.0), 1.0), 4.0 / 3.0 * np.pi, (1.0, 2.0, 3.0)),
+    cylinder: (((0.0, 0.0, -1.0), (0.0, 0.0, 1.0), 0.8), 1.28 * np.pi, (0.0, 0.0, 0.0)),
+    tube: (((0.0, 0.0, 0.0), (1.0, 2.0, 2.0), 0.5, 1.0), 2.25 * np.pi, (0.5, 1.0, 1.0)),
+}
+
+
+def nearest(x):
+    """Distance from each particle to its nearest neighbour, (n,)."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(x).query(x, 2)[0][:, 1]
+
+
+def depth(shape, arguments, x):
+    """How deep points lie in a shape, written down a second time; negative outside."""
+    if shape in (cylinder, tube):
+        start, end = np.array(arguments[0]), np.array(arguments[1])
+        length, axis = np.linalg.norm(end - start), (end - start) / np.linalg.norm(end - start)
+        along = (x - start) @ axis
+        r = np.linalg.norm(x - start - along[:, None] * axis, axis=1)
+        ends, radii = np.minimum(along, length - along), arguments[2:]
+    else:
+        r, ends, radii = np.linalg.norm(x - arguments[0], axis=1), np.inf, arguments[1:]
+    inner = r - radii[0] if len(radii) == 2 else np.inf
+    return np.minimum(np.minimum(radii[-1] - r, inner), ends)
+
+
+@pytest.mark.parametrize("filling", FILLINGS, ids=lambda f: type(f).__name__)
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda f: f.__name__)
+@pytest.mark.parametrize("relaxation", [None, Relaxation(sweeps=40)], ids=["cut", "relaxed"])
+def test_shapes_hold_their_volume(shape, filling, relaxation):
+    arguments, exact, centre = SHAPES[shape]
+    spacing = 0.12
+    x, volume = shape(*arguments, spacing, filling=filling, relaxation=relaxation)
+    assert x.shape == (len(volume), len(centre))
+    assert volume.sum() == pytest.approx(exact, rel=1e-13)
+    assert np.ptp(volume) == 0.0
+    # The number of particles is that of the spacing, but for what a cut takes or leaves at surfaces 4 spacings apart.
+    assert len(x) == pytest.approx(exact / spacing ** x.shape[1], rel=0.12)
+    assert depth(shape, arguments, x).min() > (0.0 if relaxation is None else 0.2 * spacing)
+    # Lattices are symmetric about their centre, close packing in 3-D about an axis only.
+    tolerance = 0.1 * spacing if isinstance(filling, Staggered) and x.shape[1] == 3 else 1e-12
+    np.testing.assert_allclose(x.mean(axis=0), centre, rtol=0, atol=tolerance)
+    assert nearest(x).min() > 0.8 * spacing
+
+
+@pytest.mark.parametrize("filling", FILLINGS, ids=lambda f: type(f).__name__)
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_boxes_of_every_filling_are_full_and_symmetric(filling, dim):
+    lower, upper = np.array([-1.0, 0.5, 2.0])[:dim], np.array([1.0, 1.55, 2.6])[:dim]
+    x, volume = box(lower, upper, 0.1, filling=filling)
+    assert len(x) * volume == pytest.approx(np.prod(upper - lower), rel=1e-13)
+    assert volume == pytest.approx(0.1**dim, rel=0.2)  # whole cells in a short box
+    np.testing.assert_allclose(x.mean(axis=0), (lower + upper) / 2, rtol=0, atol=1e-13)
+    distances = nearest(x)
+    # Next neighbours of close packing are farther apart at the same volume: 2^(1/6), of bcc 3^(1/2) 2^(-2/3).
+    closest = {
+        (BodyCentred, 3): 3.0**0.5 / 2.0 ** (2.0 / 3.0),
+        (Staggered, 2): (2.0 / 3.0**0.5) ** 0.5,
+        (Staggered, 3): 2.0 ** (1.0 / 6.0),
+    }.get((type(filling), dim), 1.0)
+    assert distances.mean() == pytest.approx(closest * volume ** (1.0 / dim), rel=0.08)
+
+
+@pytest.mark.parametrize("filling", [Lattice(), BodyCentred()], ids=lambda f: type(f).__name__)
+def test_disc_is_its_own_image(filling):
+    """Turned by half a turn the particles fall on each other; on the square lattice mirrored too."""
+    from scipy.spatial import cKDTree
+
+    x, _ = disc((0.0, 0.0), 1.0, 0.13, filling=filling)
+    images = [-x, x * [-1.0, 1.0], x[:, ::-1]] if isinstance(filling, Lattice) else [-x]
+    for image in images:
+        assert cKDTree(x).query(image)[0].max() < 1e-13
+
+
+def test_relaxed_disc_fits_its_rim_and_is_even():
+    """A cut lattice leaves steps at the rim; relaxed particles lie half a spacing beneath it, all round."""
+    spacing = 0.1
+    cut, _ = disc((0.0, 0.0), 1.0, spacing)
+    relaxed, _ = disc((0.0, 0.0), 1.0, spacing, relaxation=Relaxation())
+    rims = []
+    for x in (cut, relaxed):
+        sectors = ((np.arctan2(x[:, 1], x[:, 0]) + np.pi) / (2.0 * np.pi) * 40).astype(int).clip(0, 39)
+        rims.append(np.array([1.0 - np.linalg.norm(x[sectors == k], axis=1).max() for k in range(40)]))
+    assert np.ptp(rims[0]) > 0.7 * spacing
+    assert np.ptp(rims[1]) < 0.3 * spacing and rims[1].mean() == pytest.approx(0.5 * spacing, rel=0.15)
+    assert nearest(relaxed).min() > 0.85 * spacing
+    again, _ = disc((0.0, 0.0), 1.0, spacing, relaxation=Relaxation())
+    np.testing.assert_array_equal(relaxed, again)
+
+
+def test_cylinder_has_flat_ends_along_any_axis():
+    x, _ = cylinder((0.0, 0.0, 0.0), (1.05, 0.0, 0.0), 0.5, 0.1)
+    assert x[:, 0].min() == pytest.approx(1.05 / 20) and x[:, 0].max() == pytest.approx(1.05 - 1.05 / 20)
+    assert len(np.unique(np.round(x[:, 0], 9))) == 10
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: disc((0.0, 0.0), 1.0, 1.1), "too coarse, the thinnest part is 2 m"),
+        (lambda: disc((0.0, 0.0), -1.0, 0.1), "disc: radius must be positive and finite, got -1.0"),
+        (lambda: disc((0.0, 0.0, 0.0), 1.0, 0.1), "disc: points must be 2 finite numbers"),
+        (lambda: ring((0.0, 0.0), 1.0, 0.5, 0.1), "ring: inner must be below outer, got 1.0 and 0.5"),
+        (lambda: ring((0.0, 0.0), 0.9, 1.0, 0.1), "ring: a spacing of 0.1 m is too coarse, the thinnest part is 0.1"),
+        (lambda: sphere((0.0, 0.0, 0.0), 1.0, np.nan), "sphere: spacing must be positive and finite, got nan"),
+        (lambda: cylinder((0.0,) * 3, (0.0,) * 3, 1.0, 0.1), "cylinder: distance from start to end must be positive"),
+        (lambda: tube((0.0,) * 3, (0.0, 0.0, 0.1), 0.5, 1.0, 0.1), "tube: a spacing of 0.1 m is too coarse"),
+        (lambda: box((0.0,) * 3, (1.0,) * 3, 1e-4), "at most 2147483647 particles, got 1e"),
+        (lambda: Relaxation(sweeps=0), "sweeps must be at least 1"),
+        (lambda: Relaxation(gain=0.5), r"gain must be in \(0, 0.2\]"),
+    ],
+)
+def test_errors_name_the_cause(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+# meshes
+
+
+def brick(lower, upper):
+    """Corners and outward triangles of a box."""
+    corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    triangles = np.array([[q[0], q[a], q[a + 1]] for q in quads for a in (1, 2)])
+    return np.array(lower) + corners * (np.array(upper) - lower), triangles
+
+
+def angle_profile():
+    """Corners and triangles of an L: a unit square 1 m deep less its upper right quarter; concave."""
+    outline = np.array([[0, 0], [1, 0], [1, 0.5], [0.5, 0.5], [0.5, 1], [0, 1]], dtype=float)
+    points = np.concatenate([np.pad(outline, ((0, 0), (0, 1))), np.pad(outline, ((0, 0), (0, 1)), constant_values=1.0)])
+    flat = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [3, 4, 5]])
+    sides = [t for k in range(6) for t in ([k, (k + 1) % 6, (k + 1) % 6 + 6], [k, (k + 1) % 6 + 6, k + 6])]
+    return points, np.concatenate([flat[:, ::-1], flat + 6, sides])
+
+
+def write(path, points, triangles, **options):
+    import meshio
+
+    meshio.Mesh(points, [("triangle", np.asarray(triangles))]).write(path, **options)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "vtk", "vtu", "msh"])
+def test_concave_mesh_is_filled_with_its_volume(tmp_path, suffix):
+    options = {"msh": {"file_format": "gmsh22"}}.get(suffix, {})
+    file = write(tmp_path / f"angle.{suffix}", *angle_profile(), **options)
+    x, volume = mesh(file, 0.05)
+    # The lattice of 20³ cells fits the angle exactly: three quarters of it are inside, none in the notch.
+    assert len(x) == 6000 and volume.sum() == pytest.approx(0.75, rel=1e-6)
+    np.testing.assert_allclose(np.unique(np.round(x[:, 2], 6)), (np.arange(20) + 0.5) / 20, atol=1e-6)
+    assert not ((x[:, 0] > 0.5) & (x[:, 1] > 0.5)).any()
+
+
+@pytest.mark.parametrize("filling", FILLINGS, ids=lambda f: type(f).__name__)
+def test_every_filling_of_a_mesh(tmp_path, filling):
+    file = write(tmp_path / "angle.vtk", *angle_profile())
+    for relaxation in (None, Relaxation(sweeps=20)):
+        x, volume = mesh(file, 0.1, filling=filling, relaxation=relaxation)
+        assert volume.sum() == pytest.approx(0.75, rel=1e-12)
+        assert len(x) == pytest.approx(750, rel=0.1)
+        assert x.min() > 0.0 and x.max() < 1.0 and not ((x[:, 0] > 0.5) & (x[:, 1] > 0.5)).any()
+
+
+def test_triangles_may_all_face_inwards_and_lengths_be_millimetres(tmp_path):
+    points, triangles = angle_profile()
+    file = write(tmp_path / "inwards.vtk", 1e3 * points, triangles[:, ::-1])
+    x, volume = mesh(file, 0.1, scale=1e-3)
+    assert volume.sum() == pytest.approx(0.75, rel=1e-12) and x.max() < 1.0
+
+
+def test_tetrahedra_and_a_patch_of_gmsh(tmp_path):
+    import meshio
+
+    points, triangles = brick((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    cut = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
+    meshio.Mesh(points, [("tetra", cut)]).write(tmp_path / "tetrahedra.vtk")
+    x, volume = mesh(tmp_path / "tetrahedra.vtk", 0.25)
+    assert len(x) == 64 and volume.sum() == pytest.approx(1.0, rel=1e-12)
+    # The first two triangles are the face x = 0, here a physical group with a name, the others a second group.
+    groups = np.array([7, 7] + [8] * 10)
+    meshio.Mesh(
+        points,
+        [("triangle", triangles)],
+        cell_data={"gmsh:physical": [groups], "gmsh:geometrical": [groups]},
+        field_data={"clamp": np.array([7, 2])},
+    ).write(tmp_path / "groups.msh", file_format="gmsh22")
+    np.testing.assert_array_equal(Patch(tmp_path / "groups.msh", 0.2, "clamp")(x), x[:, 0] < 0.25)
+    np.testing.assert_array_equal(Patch(tmp_path / "groups.msh", 0.2, "8")(x).sum(), 64 - 2 * 2 * 3)
+    assert Patch(tmp_path / "groups.msh", 0.2)(x).sum() == 64 - 8
+    with pytest.raises(ValueError, match=r"patch of the mesh must be one of \['8', 'clamp'\], got 'clmp'"):
+        Patch(tmp_path / "groups.msh", 0.2, "clmp")(x)
+
+
+def test_bad_meshes_are_named(tmp_path):
+    points, triangles = angle_profile()
+    with pytest.raises(ValueError, match=r"surface must be closed .* got 3 edges .* first at \["):
+        mesh(write(tmp_path / "open.vtk", points, triangles[1:]), 0.1)
+    turned = np.concatenate([triangles[:1, ::-1], triangles[1:]])
+    with pytest.raises(ValueError, match="turn the same way"):
+        mesh(write(tmp_path / "turned.vtk", points, turned), 0.1)
+    closed = write(tmp_path / "closed.vtk", points, triangles)
+    with pytest.raises(ValueError, match=r"too coarse|at least one cell"):
+        mesh(closed, 0.9)
+    with pytest.raises(FileNotFoundError, match=r"nowhere\.stl"):
+        mesh(tmp_path / "nowhere.stl", 0.1)
+    (tmp_path / "noise.stl").write_bytes(b"no mesh")
+    with pytest.raises(ValueError, match=r"noise\.stl: "):
+        mesh(tmp_path / "noise.stl", 0.1)
+    import meshio
+
+    meshio.Mesh(points, [("line", np.array([[0, 1]]))]).write(tmp_path / "lines.vtk")
+    with pytest.raises(ValueError, match=r"must have triangles, quadrangles or tetrahedra, got cells \['line'\]"):
+        mesh(tmp_path / "lines.vtk", 0.1)
+
+
+def test_missing_meshio_is_named(tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'warp_eulsph\[mesh\]'"):
+        mesh(tmp_path / "a.stl", 0.1)

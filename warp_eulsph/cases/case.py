@@ -1,0 +1,195 @@
+"""The case: the schema of a case file, and what it builds."""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import warp as wp
+from pydantic import Field, field_validator, model_validator
+
+from .. import geometry
+from ..boundaries import Boundary, mirror
+from ..boundaries.mirror import Image
+from ..materials import Material
+from ..output import FIELDS
+from ..scheme.lax import Lax
+from ..scheme.lax_wendroff import LaxWendroff
+from ..scheme.reference import ReferencePolicy
+from ..scheme.time_step import TimeStep
+from ..scheme.verlet import Verlet
+from ..simulation import Body, Simulation
+from ..space import Space
+from ..weights import Weight
+from .expressions import COORDINATES, nearest
+from .options import Table, Zone, boundaries, choice, one_of
+from .values import Formula, Number, PlaceFormula, Whole
+
+#: The shapes of ``geometry``: its functions.
+SHAPES = tuple(getattr(geometry, name) for name in geometry.__all__ if not isinstance(getattr(geometry, name), type))
+PRECISIONS = {"double": wp.float64, "single": wp.float32}
+Precision = Literal["double", "single"]
+
+
+class MirrorPlane(Table):
+    """A plane behind which a body gets mirror ghosts."""
+
+    point: list[Number] = Field(description="a point of the plane [m], (dim,)")
+    normal: list[Number] = Field(description="normal of the plane, out of the body, (dim,)")
+    depth: Number | None = Field(None, description="particles this near get a ghost [m]; two support radii by default")
+    image: choice(Image) = Field("Wall", validate_default=True, description="Wall, or Antisymmetry for a linear law")  # type: ignore[valid-type]
+
+
+class BodyTable(Table):
+    """A solid: a shape filled with particles, its material, and how it starts."""
+
+    shape: one_of(*SHAPES) = Field(description="a function of warp_eulsph.geometry")  # type: ignore[valid-type]
+    material: choice(Material)  # type: ignore[valid-type]
+    velocity: PlaceFormula = Field(0.0, validate_default=True, description="initial velocity [m/s]")
+    volume: PlaceFormula | None = Field(None, description="volumes [m^dim] instead of those of the shape")
+    spacing: PlaceFormula | None = Field(None, description="spacings [m]; the dim-th root of the volume by default")
+    mirror: list[MirrorPlane] = Field([], description="planes behind which the body gets mirror ghosts")
+
+    @property
+    def dim(self) -> int:
+        """Dimension, by the first point of the shape; meshes are in 3-D."""
+        points = [value for _, value in self.shape if isinstance(value, list)]
+        return len(points[0]) if points else 3
+
+    def build(self, name: str) -> Body:
+        """The body, without ghosts."""
+        x, volume, *surface = self.shape.make()
+        return Body(
+            x=x,
+            volume=volume if self.volume is None else self.volume.at(x)[:, 0],
+            spacing=None if self.spacing is None else self.spacing.at(x)[:, 0],
+            material=self.material.make(),
+            velocity=self.velocity.at(x),
+            surface=surface[0] if surface else None,
+            name=name,
+        )
+
+
+class OutputTable(Table):
+    """What a run writes, and when."""
+
+    every: Number | None = Field(None, gt=0.0, description="time between snapshots [s]")
+    steps: Whole | None = Field(None, gt=0, description="steps between snapshots")
+    at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
+    fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
+    precision: Precision = Field("single", description="of the stored numbers")
+    region: Zone | None = Field(None, description="only these particles")
+
+    @field_validator("fields")
+    @classmethod
+    def _known(cls, fields: list[str] | None) -> list[str] | None:
+        for name in fields or []:
+            if name not in FIELDS:
+                raise ValueError(f"unknown field {name!r}{nearest(name, FIELDS)}; known are {list(FIELDS)}")
+        return fields
+
+
+class Case(Table):
+    """A whole problem; SI units throughout, plane strain in 2-D and uniaxial strain in 1-D.
+
+    Numbers may be formulas of ``parameters``; regions, velocities and loads may be formulas of place and time.
+    """
+
+    title: str = Field("", description="what is solved, in one line")
+    until: Number = Field(gt=0.0, description="end time [s]")
+    parameters: dict[str, Number] = Field({}, description="numbers that formulas may use by name, or formulas of those")
+    body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
+    boundary: list[boundaries()] = Field([], description="conditions, imposed in this order")  # type: ignore
+    reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
+    scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
+    time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
+    weight: choice(Weight) = Field("CubicSpline", validate_default=True)  # type: ignore[valid-type]
+    dilation: Number = Field(1.3, gt=0.0, description="smoothing length over spacing")
+    periodic: list[Number] | None = Field(None, description="lengths [m] of a periodic box at the origin; 0 is open")
+    precision: Precision = Field("double", description="of the simulation")
+    device: str | None = Field(None, description="Warp device such as cuda:0; Warp's default otherwise")
+    output: OutputTable = Field(default_factory=OutputTable.model_construct)
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the first body."""
+        return next(iter(self.body.values())).dim
+
+    @property
+    def space(self) -> Space:
+        """Dimension and precision."""
+        return Space(self.dim, PRECISIONS[self.precision], self.periodic is not None)
+
+    def build(self) -> Simulation:
+        """The simulation at its start.
+
+        Raises:
+            ValueError: as ``Simulation`` and the geometry say, particles or regions that do not fit together.
+            ModuleNotFoundError: a mesh without meshio.
+            OSError: a mesh file that is not there.
+        """
+        bodies, ghosts = [], []
+        weight, space = self.weight.make(), self.space
+        for name, table in self.body.items():
+            body = table.build(name)
+            for plane in table.mirror:
+                depth = plane.depth
+                if depth is None:
+                    depth = 2.0 * weight.support * self.dilation * float(body.spacing.max())
+                body, condition = mirror(
+                    body, point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()
+                )
+                ghosts.append(condition)
+            bodies.append(body)
+        conditions: Sequence[Boundary] = [condition.make(space) for condition in self.boundary]
+        return Simulation(
+            bodies,
+            boundaries=[*conditions, *ghosts],
+            reference=self.reference.make(),
+            scheme=self.scheme.make(),
+            time_step=self.time_step.make(),
+            weight=weight,
+            dilation=self.dilation,
+            periodic=self.periodic,
+            dtype=PRECISIONS[self.precision],
+            device=self.device,
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """The full case with its defaults, formulas of parameters worked out; JSON and TOML can hold it.
+
+        ``parse_case`` of it gives the same case.
+        """
+        return self.model_dump(mode="json", exclude_none=True)
+
+    @model_validator(mode="after")
+    def _agree(self) -> "Case":
+        """What one table says of another: bodies by name, dimensions."""
+        wrong = []
+        dim, where = self.dim, " and ".join(COORDINATES[: self.dim])
+        for name, body in self.body.items():
+            if body.dim != dim:
+                wrong.append(f"body.{name}: bodies must have the same dimension, got {body.dim} and {dim}")
+        for path, value in self._formulas():
+            beyond = value.names & set(COORDINATES[dim:])
+            if beyond:
+                wrong.append(f"{path}: {sorted(beyond)} are not coordinates in {dim}-D, which has {where}")
+            allowed = {1} if path.endswith((".volume", ".spacing")) else {1, dim}
+            if len(value.parts) not in allowed:
+                counts = " or ".join(str(count) for count in sorted(allowed))
+                wrong.append(f"{path}: must have {counts} components in {dim}-D, got {len(value.parts)}")
+        for k, condition in enumerate(self.boundary):
+            if condition.body is not None and condition.body not in self.body:
+                hint = nearest(condition.body, self.body)
+                wrong.append(
+                    f"boundary.{k}.body: unknown body {condition.body!r}{hint}; bodies are {sorted(self.body)}"
+                )
+        if wrong:
+            raise ValueError("\n".join(wrong))
+        return self
+
+    def _formulas(self) -> list[tuple[str, Formula]]:
+        """Path and value of every formula of place."""
+        tables: dict[str, Table] = {f"body.{name}": body for name, body in self.body.items()}
+        tables |= {f"boundary.{k}": condition for k, condition in enumerate(self.boundary)}
+        tables["output"] = self.output
+        pairs = ((f"{path}.{name}", value) for path, table in tables.items() for name, value in table)
+        return [(path, value) for path, value in pairs if isinstance(value, Formula)]

@@ -1,0 +1,261 @@
+"""Tables of case files made from the classes and functions of the package: what those take, a case file takes.
+
+A material, boundary, scheme or shape is a table whose ``kind`` is the name of the class or function and whose other
+keys are its arguments. Nothing is listed here but how a type of Python is written in TOML, so that a new material is in
+case files by existing.
+"""
+
+import dataclasses
+import functools
+import importlib
+import inspect
+import pkgutil
+import re
+import types
+import typing
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Annotated, Any, ClassVar, Literal, Union
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Tag,
+    ValidationInfo,
+    create_model,
+    model_validator,
+)
+from pydantic_core import core_schema
+
+from ..boundaries import Boundary
+from ..geometry import Patch
+from ..scheme.balance import Balance
+from ..scheme.pair_areas import PairAreas
+from ..scheme.surface_vectors import SurfaceVectors
+from .values import Formula, Number, PathText, PlaceTimeFormula, Whole, ZoneFormula, reading
+
+
+class Table(BaseModel):
+    """A table of a case file: no unknown keys, no conversions, no infinities."""
+
+    model_config = ConfigDict(
+        extra="forbid", strict=True, allow_inf_nan=False, frozen=True, arbitrary_types_allowed=True
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _note_keys(cls, given: Any, info: ValidationInfo) -> Any:
+        if isinstance(given, dict):
+            reading(info).keys[id(given)] = list(cls.model_fields)
+        return given
+
+
+class Options(Table):
+    """A class or function and its arguments."""
+
+    target: ClassVar[Callable[..., Any]]
+
+    def make(self, space: Any = None) -> Any:
+        """The object, or what the function returns; ``space`` is needed where formulas of place and time occur."""
+        return self.target(**{name: _made(getattr(self, name), space, name) for name in self._arguments()})
+
+    @classmethod
+    def _arguments(cls) -> list[str]:
+        return [name for name in cls.model_fields if name != "kind"]
+
+    @model_validator(mode="after")
+    def _check(self) -> "Options":
+        """The class's own checks, so that their message stands beside all others; formulas come to them later."""
+        values = [getattr(self, name) for name in self._arguments()]
+        if isinstance(self.target, type) and not any(isinstance(value, Formula) for value in values):
+            self.make()
+        return self
+
+
+def _made(value: Any, space: Any, name: str) -> Any:
+    if isinstance(value, Options):
+        return value.make(space)
+    if isinstance(value, Formula):
+        if name == "region":
+            return lambda X: value.at(X)[:, 0].astype(bool)
+        return value.condition(space, always_function=name == "displacement")
+    return value
+
+
+class Nothing(Options):
+    """No such option: ``"None"``."""
+
+    kind: Literal["None"] = "None"
+    target = staticmethod(lambda: None)
+
+
+@functools.cache
+def table_of(target: Callable[..., Any], sole: bool = False) -> type[Options]:
+    """The table for a class or function; ``sole`` when nothing else can stand in its place, so that it needs no kind.
+
+    Raises:
+        TypeError: an argument that cannot be written in TOML.
+    """
+    hints = typing.get_type_hints(target)
+    described = descriptions(target)
+    fields: dict[str, Any] = {}
+    for parameter in _parameters(target):
+        name, default = parameter.name, parameter.default
+        kind = _written(name, hints.get(name, Any))
+        if default is inspect.Parameter.empty:
+            fields[name] = (kind, Field(description=described.get(name)))
+        else:
+            made = _given(default)
+            fields[name] = (kind, Field(default_factory=lambda made=made: made, description=described.get(name)))
+    kind_name = target.__name__
+    fields = {"kind": (Literal[kind_name], kind_name if sole else ...), **fields}  # type: ignore[valid-type]
+    model = create_model(kind_name, __base__=Options, __doc__=_summary(target), **fields)
+    model.target = target if isinstance(target, type) else staticmethod(target)
+    return model
+
+
+def _parameters(target: Callable[..., Any]) -> list[inspect.Parameter]:
+    if isinstance(target, type) and not dataclasses.is_dataclass(target):
+        return []  # a class without options, as weights are
+    return list(inspect.signature(target).parameters.values())
+
+
+def _given(default: Any) -> Any:
+    """A default as the table holds it."""
+    if default is None or isinstance(default, (bool, int, float, str)):
+        return default
+    arguments = {p.name: _given(getattr(default, p.name)) for p in _parameters(type(default))}
+    target: Any = type(default)
+    return table_of(target).model_construct(kind=target.__name__, **arguments)
+
+
+def _written(name: str, hint: Any) -> Any:
+    """How an argument is written in TOML."""
+    if name == "region":
+        return Zone | None
+    if name in ("value", "displacement"):
+        return PlaceTimeFormula
+    if name == "correction":
+        return choice(Balance, SurfaceVectors, PairAreas, optional=True)
+    plain = {float: Number, int: Whole, bool: bool, str: str}
+    if hint in plain:
+        return plain[hint]
+    origin, members = typing.get_origin(hint), typing.get_args(hint)
+    if origin is Sequence or origin is typing.get_origin(Sequence[int]):
+        return list[plain[members[0]]]  # type: ignore[valid-type]
+    if origin in (Union, types.UnionType):
+        if PathLike in members:
+            return PathText
+        others = [member for member in members if member is not types.NoneType]
+        if len(others) < len(members) and len(others) == 1:
+            return (
+                _written(name, others[0]) | None
+                if others[0] in plain or typing.get_origin(others[0])
+                else choice(*others, optional=True)
+            )
+        return choice(*others, optional=len(others) < len(members))
+    if isinstance(hint, type) and hint.__module__.startswith(__package__.split(".")[0]):
+        return choice(hint)
+    raise TypeError(f"{name}: {hint} cannot be written in a case file")
+
+
+@functools.cache
+def choice(*bases: type, optional: bool = False) -> Any:
+    """One of the concrete classes below ``bases``: a table with a kind, or the bare name where all has defaults."""
+    targets = [target for base in bases for target in concrete(base)]
+    return one_of(*targets, optional=optional)
+
+
+@functools.cache
+def one_of(*targets: Callable[..., Any], optional: bool = False) -> Any:
+    """One of these classes or functions."""
+    if len(targets) == 1 and not optional:
+        return Annotated[table_of(targets[0], sole=True), _Name((targets[0].__name__,))]
+    tables = [table_of(target) for target in targets] + ([Nothing] if optional else [])
+    names = tuple(target.__name__ for target in targets) + (("None",) if optional else ())
+    sole = targets[0].__name__ if len(targets) == 1 else None
+    return Annotated[Union[tuple(tables)], Field(discriminator="kind"), _Name(names, sole)]  # noqa: UP007
+
+
+@dataclasses.dataclass(frozen=True)
+class _Name:
+    """Lets a bare name stand for a table with that kind; ``sole`` is the kind of a table without one."""
+
+    names: tuple[str, ...]
+    sole: str | None = None
+
+    def _expand(self, given: Any) -> Any:
+        if isinstance(given, str):
+            return {"kind": given}
+        if self.sole is not None and isinstance(given, dict) and "kind" not in given:
+            given["kind"] = self.sole  # in the table itself, which messages are looked up by
+        return given
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self._expand, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> Any:
+        return {"anyOf": [{"enum": list(self.names)}, handler(schema)]}
+
+
+def concrete(base: type) -> list[type]:
+    """The classes of the package below ``base`` that can be made, by name; ``base`` itself when it has none."""
+    package = importlib.import_module(base.__module__.rpartition(".")[0])
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{package.__name__}.{module.name}")
+    below, todo = set(), [base]
+    while todo:
+        cls = todo.pop()
+        todo += cls.__subclasses__()
+        # Those of the tests and of a user's own script are not what a case file can name.
+        if cls is not base and cls.__module__.startswith(f"{package.__name__.split('.')[0]}."):
+            below.add(cls)
+    found = [cls for cls in below if not inspect.isabstract(cls)] or [base]
+    return sorted(found, key=lambda cls: cls.__name__)
+
+
+def writable(base: type) -> list[type]:
+    """Those of ``concrete`` whose arguments can all be written in a case file."""
+
+    def can(cls: type) -> bool:
+        try:
+            table_of(cls)
+        except TypeError:
+            return False
+        return True
+
+    return [cls for cls in concrete(base) if can(cls)]
+
+
+def descriptions(target: Callable[..., Any]) -> dict[str, str]:
+    """What the docstrings say of the arguments, with units; those of base classes where a class says nothing."""
+    found: dict[str, str] = {}
+    for source in target.__mro__ if isinstance(target, type) else [target]:
+        block = re.search(r"Args:\n(.*?)(?:\n\n|\Z)", inspect.cleandoc(source.__doc__ or ""), re.DOTALL)
+        for name, text in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", block[1] if block else "", re.MULTILINE):
+            found.setdefault(name, re.sub(r"\s+", " ", text))
+    return found
+
+
+def _summary(target: Callable[..., Any]) -> str:
+    return re.sub(r"\s+", " ", inspect.cleandoc(target.__doc__ or "").split("\n\n")[0])
+
+
+def _zone_kind(given: Any) -> str:
+    return "patch" if isinstance(given, (dict, Options)) else "formula"
+
+
+#: Which particles: a comparison of their initial positions, or near a patch of a mesh.
+Zone = Annotated[
+    Annotated[ZoneFormula, Tag("formula")] | Annotated[table_of(Patch, sole=True), Tag("patch")],  # type: ignore
+    Discriminator(_zone_kind),
+]
+
+
+def boundaries() -> Any:
+    """One of the boundary conditions."""
+    return one_of(*writable(Boundary))
