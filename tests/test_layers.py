@@ -26,6 +26,7 @@ LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
 FRONT_ENDS = {"validation/command.py", "validation/step_cost.py"}  # what the command line prints is its result
+FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 
 
 def room(path):

@@ -96,14 +96,31 @@ class AtTimes(Schedule):
         return next((time for time in self.times if time > t), math.inf)
 
 
-def next_target(schedules: Sequence[Schedule], t: float, until: float) -> float:
+@dataclass(frozen=True)
+class AnyOf(Schedule):
+    """When any of several schedules says so."""
+
+    schedules: Sequence[Schedule]
+
+    def due(self, t: float, step: int) -> bool:
+        return any(schedule.due(t, step) for schedule in self.schedules)
+
+    def next_time(self, t: float) -> float:
+        return min((schedule.next_time(t) for schedule in self.schedules), default=math.inf)
+
+    def steps_left(self, step: int) -> int | None:
+        left = [steps for schedule in self.schedules if (steps := schedule.steps_left(step)) is not None]
+        return min(left, default=None)
+
+
+def next_target(schedule: Schedule, t: float, until: float) -> float:
     """The next time [s] to hit exactly, at most ``until``, which swallows a target a hair before it."""
-    target = min((schedule.next_time(t) for schedule in schedules), default=math.inf)
+    target = schedule.next_time(t)
     return target if target < until - SAME * (until - t) else until
 
 
 def targets(schedule: Schedule, t: float, until: float) -> Iterator[float]:
     """The times [s] after ``t`` that ``schedule`` has up to ``until``, which is the last."""
     while t < until:
-        t = next_target([schedule], t, until)
+        t = next_target(schedule, t, until)
         yield t

@@ -79,6 +79,17 @@ class RunDirectory:
         finally:
             lock.release()
 
+    @property
+    def busy(self) -> bool:
+        """Whether somebody writes here now."""
+        if not (self.path / "run.lock").exists():
+            return False
+        try:
+            with self.locked():
+                return False
+        except BusyError:
+            return True
+
     def abandon(self) -> Path | None:
         """Move all that a run left here into a new folder of ``abandoned/``; the folder, None if there was nothing.
 

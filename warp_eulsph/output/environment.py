@@ -1,7 +1,6 @@
 """Where a run took place: versions, device, precision. Equal bits are promised where these are equal."""
 
 import platform
-from importlib import metadata
 from typing import Any
 
 from ..simulation import Simulation
@@ -9,6 +8,8 @@ from ..simulation import Simulation
 
 def environment(simulation: Simulation) -> dict[str, Any]:
     """Versions, device and precision of this process and ``simulation``, as JSON takes them."""
+    from importlib import metadata  # slow to load, and the command line shows its help without
+
     device = simulation.device
     return {
         "versions": {

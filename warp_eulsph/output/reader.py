@@ -200,8 +200,12 @@ class Run(Sequence[RunFrame]):
     @cached_property
     def probes(self) -> dict[str, dict[str, np.ndarray]]:
         """Columns of each probe's table, by its name."""
-        folders = sorted(path for path in self.directory.probes.glob("*") if path.is_dir())
-        return {folder.name: read_table(folder)[0] for folder in folders}
+        return {name: read_table(self.directory.probes / name)[0] for name in self.probe_names}
+
+    @property
+    def probe_names(self) -> list[str]:
+        """Names of the probes that have tables."""
+        return sorted(path.name for path in self.directory.probes.glob("*") if any(path.glob("*.h5")))
 
     @property
     def description(self) -> dict[str, Any]:
@@ -217,6 +221,12 @@ class Run(Sequence[RunFrame]):
     def status(self) -> Mapping[str, Any]:
         """How the run ended, or that it is running."""
         return self.directory.read(self.directory.status)
+
+    @property
+    def state(self) -> str:
+        """``done``, ``stopped``, ``unstable``, ``failed``, ``running``, or ``killed``: it was running and is not."""
+        state = self.status.get("state", "unknown")
+        return "killed" if state == "running" and not self.directory.busy else state
 
     def compare(self, other: "Run", fields: Sequence[str] = ("x",)) -> Comparison:
         """Differences of the same particles in both runs, at the times that both have.

@@ -1,6 +1,7 @@
 """The run that is kept: steps, what is written on the way, and how it is taken up again."""
 
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -87,26 +88,32 @@ def record(
     """
     home = RunDirectory(directory)
     with home.locked():
-        checkpoint = _prepare(home, simulation, recording, resume=resume, force=force, replace=replace)
-        if not simulation.t <= until:
-            raise ValueError(f"until must not be before the present time {simulation.t} s, got {until}")
+        checkpoint = Checkpoints(home.checkpoints).newest() if resume else None
+        present = simulation.t if checkpoint is None else checkpoint.time
+        if not (math.isfinite(until) and until >= present):
+            raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
+        if checkpoint is None:
+            _begin(home, simulation, replace=replace or resume)
+        else:
+            _go_on(home, simulation, recording, checkpoint, force=force)
         kept = {"until": until, "case": dict(case or {}), **_description(simulation, recording)}
         home.write(home.description, kept)
         recorder = _Recorder(home, simulation, recording, resume=checkpoint is not None)
         return recorder.run(until, stop, watch)
 
 
-def _prepare(
-    home: RunDirectory, simulation: Simulation, recording: Recording, *, resume: bool, force: bool, replace: bool
-) -> Checkpoint | None:
-    """Make room, and put the simulation where the run was; the checkpoint it was taken from, None at the start."""
-    checkpoint = Checkpoints(home.checkpoints).newest() if resume else None
-    if checkpoint is None:
-        if home.holds_a_run and not (resume or replace):
-            raise FileExistsError(f"{home.path} holds a run; resume it, choose another directory, or replace it")
-        home.abandon()
-        home.write(home.environment, {"sessions": [environment(simulation)]})
-        return None
+def _begin(home: RunDirectory, simulation: Simulation, *, replace: bool) -> None:
+    """Make room for a new run."""
+    if home.holds_a_run and not replace:
+        raise FileExistsError(f"{home.path} holds a run; resume it, choose another directory, or replace it")
+    home.abandon()
+    home.write(home.environment, {"sessions": [environment(simulation)]})
+
+
+def _go_on(
+    home: RunDirectory, simulation: Simulation, recording: Recording, checkpoint: Checkpoint, *, force: bool
+) -> None:
+    """Put the simulation where the run was, and set aside what the run has of later steps."""
     _compare(checkpoint, simulation, recording, force)
     simulation.restore(checkpoint.arrays, checkpoint.counters)
     home.rewind(checkpoint.step)
@@ -114,7 +121,6 @@ def _prepare(
     sessions = home.read(home.environment).get("sessions", [])
     home.write(home.environment, {"sessions": [*sessions, environment(simulation)]})
     log.info("resumed at step %d, t = %.8g s", checkpoint.step, checkpoint.time)
-    return checkpoint
 
 
 def _description(simulation: Simulation, recording: Recording) -> dict[str, Any]:
@@ -193,10 +199,9 @@ class _Recorder:
         return Outcome(simulation.t, simulation.steps, reason if state == "stopped" else None)
 
     def _advance(self, until: float) -> None:
-        schedules, simulation = self.recording.schedules, self.simulation
-        left = [schedule.steps_left(simulation.steps) for schedule in schedules]
-        most = min((steps for steps in left if steps is not None), default=None)
-        simulation.advance(next_target(schedules, simulation.t, until), most)
+        schedule, simulation = self.recording.schedule, self.simulation
+        target = next_target(schedule, simulation.t, until)
+        simulation.advance(target, schedule.steps_left(simulation.steps))
 
     def keep(self, everything: bool) -> None:
         """Queue what is due now, or everything."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..schedule import AtTimes, EverySteps, Schedule
+from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
 from .probes import Probe
 from .snapshot import checked_precision, chosen_fields
 
@@ -46,6 +46,6 @@ class Recording:
             raise ValueError(f"checkpoint must be a positive wall time [s], got {self.checkpoint}; 600 is 10 minutes")
 
     @property
-    def schedules(self) -> list[Schedule]:
-        """All that decide where steps end."""
-        return [self.snapshots, self.log, *(probe.schedule for probe in self.probes)]
+    def schedule(self) -> Schedule:
+        """When anything is due."""
+        return AnyOf([self.snapshots, self.log, *(probe.schedule for probe in self.probes)])
