@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -212,6 +213,21 @@ def test_durations():
     assert [duration(text) for text in ("90", "90s", "1.5m", "3h", "2d")] == [90.0, 90.0, 90.0, 10800.0, 172800.0]
     with pytest.raises(SystemExit):
         main(["run", "example:punch", "--max-wall", "soon"])
+
+
+def test_documented_programs_run(tmp_path, monkeypatch, capsys):
+    """The Python of docs/runs.md, one block after the other; the first is a case file too."""
+    text = (Path(__file__).parents[1] / "docs" / "runs.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    Path("column.py").write_text(blocks[0])
+    assert main(["run", "column.py", "-s", "young=18e6", "--until", "0.01"]) == 0
+    assert Run("runs/column").probe_names == ["base", "corner"]
+    monkeypatch.chdir(tmp_path / "runs")
+    names = {}
+    for block in blocks:
+        exec(compile(block, "runs.md", "exec"), names)
+    assert names["run"].times[-1] == 0.03 and len(blocks) == 3
 
 
 def test_help_loads_no_pictures_no_meshes_no_hdf5():
