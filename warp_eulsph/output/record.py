@@ -188,6 +188,8 @@ class _Recorder:
             state = "done" if reason is None or simulation.t >= until else "stopped"
         except UnstableError as error:
             state, reason = "unstable", str(error)
+            self._flush_lines()  # what came before the failure tells most about it
+            self._flush_tables(1)
             raise
         except BaseException as error:
             reason = f"{type(error).__name__}: {error}"
