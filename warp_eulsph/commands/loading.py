@@ -105,7 +105,7 @@ def recording_of(output: Any) -> Recording:
 
 def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
     module = _module(path)
-    case = getattr(module, "CASE", None)
+    case: Any = getattr(module, "CASE", None)
     if hasattr(case, "build"):
         if overrides:
             raise ValueError(f"{path} defines CASE, which takes no settings, got {list(overrides)}")
