@@ -3,6 +3,8 @@
 import argparse
 from collections.abc import Sequence
 
+from .commands import export, plot, schema
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand; its exit status."""
@@ -24,6 +26,8 @@ def _parser() -> argparse.ArgumentParser:
     validate.add_argument("--json", action="store_true", help="print a JSON list and nothing else")
     validate.add_argument("--list", action="store_true", help="print names, titles and sources of the cases, run none")
     validate.set_defaults(run=_validate)
+    for command in (plot, export, schema):
+        command.add(commands)
     return parser
 
 

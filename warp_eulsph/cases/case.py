@@ -20,7 +20,7 @@ from ..simulation import Body, Simulation
 from ..space import Space
 from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, Zone, boundaries, choice, one_of
+from .options import Table, boundaries, choice, one_of
 from .values import Formula, Number, PlaceFormula, Whole
 
 #: The shapes of ``geometry``: its functions.
@@ -76,7 +76,6 @@ class OutputTable(Table):
     at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
     fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
     precision: Precision = Field("single", description="of the stored numbers")
-    region: Zone | None = Field(None, description="only these particles")
 
     @field_validator("fields")
     @classmethod
@@ -190,6 +189,5 @@ class Case(Table):
         """Path and value of every formula of place."""
         tables: dict[str, Table] = {f"body.{name}": body for name, body in self.body.items()}
         tables |= {f"boundary.{k}": condition for k, condition in enumerate(self.boundary)}
-        tables["output"] = self.output
         pairs = ((f"{path}.{name}", value) for path, table in tables.items() for name, value in table)
         return [(path, value) for path, value in pairs if isinstance(value, Formula)]
