@@ -3,17 +3,18 @@
 import contextlib
 import inspect
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-import tomllib
 import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.cases import CaseError, json_schema, parse_case, read_case
 from warp_eulsph.cases.case import SHAPES
 from warp_eulsph.cases.options import concrete, writable
+from warp_eulsph.cases.reading import tomllib
 from warp_eulsph.validation.cases import (
     bar,
     bending_column,
@@ -143,6 +144,19 @@ def test_schema_says_units_and_kinds():
     assert definitions["NeoHookean"]["properties"]["young"]["description"] == "Young's modulus [Pa]."
     assert definitions["TaitLiquid"]["properties"]["density"]["description"] == "initial density [kg/m³]."
     assert definitions["box"]["properties"]["spacing"]["description"].startswith("wanted spacing [m]")
+
+
+def test_case_of_the_documents_builds_and_its_mistakes_are_as_shown():
+    text = (CASES.parents[1] / "docs" / "cases.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    simulation = parse_case(tomllib.loads(example)).build()
+    simulation.step(2)
+    assert simulation.stepper.options.dissipation.epsilon == 0.8
+    bad = example.replace("poisson =", "poison =").replace('"y < layer"', '"y < leyer"')
+    with pytest.raises(CaseError) as caught:
+        parse_case(tomllib.loads(bad))
+    shown = re.search(r"```text\n(case: .*?)\n```", text, re.DOTALL)[1]
+    assert str(caught.value) == shown
 
 
 # options and formulas
