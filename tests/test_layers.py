@@ -13,10 +13,10 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
     {"space", "linalg"},
-    {"fields", "weights", "materials", "boundaries", "reduce"},
+    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "schedule", "diagnostics", "output", "geometry"},
+    {"simulation", "diagnostics", "output", "geometry"},
     {"validation", "pictures"},
     {"cases"},
     {"commands", "cli", "__main__"},
@@ -26,6 +26,7 @@ LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
 FRONT_ENDS = {"validation/command.py", "validation/step_cost.py"}  # what the command line prints is its result
+FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 
 
 def room(path):

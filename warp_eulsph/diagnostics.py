@@ -1,4 +1,4 @@
-"""Momenta and extrema of a state, reduced on the device in float64."""
+"""Momenta, extrema and sums over parts of a state, reduced on the device in float64."""
 
 import functools
 from typing import Any
@@ -12,6 +12,7 @@ from .reduce import Sum
 from .space import Space
 
 _Vec6 = wp.types.vector(length=6, dtype=wp.float64)
+_Vec11 = wp.types.vector(length=11, dtype=wp.float64)
 
 
 @functools.cache
@@ -60,6 +61,94 @@ def _make_extrema(space: Space) -> Any:
         wp.atomic_max(out, 2, wp.length(state.v[a]))
 
     return find_extrema
+
+
+@functools.cache
+def _make_body_sums(space: Space) -> Any:
+    """Kernel: (m, m x, m v, m x × v, ½ m v²) of each particle of a body, padded to 3-D, ghosts left out."""
+    Particles, State, dim = structure(space, "Particles"), structure(space, "State"), space.dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def body_sums(first: int, particles: Particles, state: State, out: wp.array(dtype=_Vec11)):
+        i = wp.tid()
+        a = first + i
+        m = wp.float64(particles.share[a] * particles.mass[a])
+        x = wp.vec3d()
+        v = wp.vec3d()
+        for k in range(wp.static(dim)):
+            x[k] = wp.float64(state.x[a][k])
+            v[k] = wp.float64(state.v[a][k])
+        L = wp.cross(x, v)
+        kinetic = wp.float64(0.5) * wp.dot(v, v)
+        out[i] = m * _Vec11(wp.float64(1.0), x[0], x[1], x[2], v[0], v[1], v[2], L[0], L[1], L[2], kinetic)
+
+    return body_sums
+
+
+@functools.cache
+def _make_section(space: Space) -> Any:
+    """Kernel: the force that other particles exert on those listed, padded to 3-D."""
+    Forces, dim = structure(space, "Forces"), space.dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def section(indices: wp.array(dtype=wp.int32), forces: Forces, out: wp.array(dtype=wp.vec3d)):
+        k = wp.tid()
+        a = indices[k]
+        total = forces.internal[a] + forces.correction[a] + forces.dissipation[a]
+        force = wp.vec3d()
+        for i in range(wp.static(dim)):
+            force[i] = wp.float64(total[i])
+        out[k] = force
+
+    return section
+
+
+class BodySums:
+    """Mass, centre, momenta and kinetic energy of one body.
+
+    Args:
+        body: its range of particles.
+    """
+
+    def __init__(self, space: Space, particles: Any, body: range, device: Any):
+        self.space, self.particles, self.body, self.device = space, particles, body, device
+        self._each = wp.zeros(len(body), dtype=_Vec11, device=device)
+        self._total, self._sum = wp.zeros(1, dtype=_Vec11, device=device), Sum(_Vec11, device)
+
+    def __call__(self, state: Any) -> dict[str, np.ndarray]:
+        """Of ``state``: centre of mass [m] and momentum [kg m/s], (dim,); angular momentum about the origin
+        [kg m²/s], (3,); kinetic energy [J], ()."""
+        arguments = [self.body.start, self.particles, state, self._each]
+        wp.launch(_make_body_sums(self.space), len(self.body), arguments, device=self.device)
+        self._sum(self._each, self._total)
+        total, dim = self._total.numpy()[0].copy(), self.space.dim
+        return {
+            "centre": total[1 : 1 + dim] / total[0],
+            "momentum": total[4 : 4 + dim],
+            "angular_momentum": total[7:10],
+            "kinetic": total[10],
+        }
+
+
+class SectionForce:
+    """Force that the rest of the material exerts on some of the particles.
+
+    Args:
+        indices: of the particles, (k,).
+    """
+
+    def __init__(self, space: Space, indices: np.ndarray, device: Any):
+        self.space, self.device = space, device
+        self._indices = wp.array(indices, dtype=wp.int32, device=device)
+        self._each, self._total = (wp.zeros(k, dtype=wp.vec3d, device=device) for k in (len(indices), 1))
+        self._sum = Sum(wp.vec3d, device)
+
+    def __call__(self, forces: Any) -> np.ndarray:
+        """[N], (dim,), from the step's ``forces``: what acts between the particles themselves cancels in the sum."""
+        arguments = [self._indices, forces, self._each]
+        wp.launch(_make_section(self.space), len(self._indices), arguments, device=self.device)
+        self._sum(self._each, self._total)
+        return self._total.numpy()[0][: self.space.dim].copy()
 
 
 class Diagnostics:

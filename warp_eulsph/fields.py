@@ -84,6 +84,11 @@ def allocate(space: Space, group: str, n: int, device: Any) -> Any:
     return fields
 
 
+def arrays(fields: Any, group: str) -> dict[str, wp.array]:
+    """The arrays of an instance of a group's struct by name: ``State.x`` and so on."""
+    return {f"{group}.{name}": getattr(fields, name) for name in GROUPS[group]}
+
+
 @functools.cache
 def neighbour_structure(space: Space) -> Any:
     """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.

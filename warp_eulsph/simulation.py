@@ -1,16 +1,16 @@
 """Bodies, conditions and scheme put together: the object a user runs."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
+from .body import Body
 from .boundaries import Assembly, Boundary
 from .diagnostics import Diagnostics
 from .fields import allocate
-from .materials import Material
+from .schedule import AtTimes, EveryTime, targets
 from .scheme.flux import Flux, check_reference
 from .scheme.health import UnstableError
 from .scheme.lax import Lax
@@ -25,66 +25,6 @@ from .weights import CubicSpline, Weight
 STEPS_BETWEEN_LOOKS = 8
 # A time step that fell below this share of the longest one means neighbourhoods that collapsed: the run would not end.
 STALLED = 1e-6
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Body:
-    """A solid as particles.
-
-    Args:
-        x: initial positions [m], (n, dim).
-        volume: initial volumes [m^dim], a number or (n,).
-        material: its law.
-        spacing: initial particle spacing [m], a number or (n,); by default volume^(1/dim).
-        velocity: initial velocities [m/s], a number, (dim,) or (n, dim).
-        surface: outward area vectors s_a [m^(dim−1)], (n, dim), or 0 for a periodic body without a surface; by default
-            the defect e_a of the initial arrangement, which on a disordered one is noise inside too. Given vectors make
-            M10, M11 and M12 work with a fixed reference as well; without them they are zero there.
-        name: for boundary conditions and output.
-
-    Raises:
-        ValueError: wrong shapes, non-finite values, volumes or spacings that are not positive.
-    """
-
-    x: np.ndarray
-    volume: Any
-    material: Material
-    spacing: Any = None
-    velocity: Any = 0.0
-    surface: Any = None
-    name: str = "body"
-
-    def __post_init__(self) -> None:
-        x = np.array(self.x, dtype=float)
-        if x.ndim != 2 or x.shape[0] == 0 or x.shape[1] not in (1, 2, 3):
-            raise ValueError(f"body {self.name!r}: x must have shape (n, 1), (n, 2) or (n, 3), got {x.shape}")
-        object.__setattr__(self, "x", x)
-        self._field("x", x, x.shape)
-        object.__setattr__(self, "volume", self._field("volume", self.volume, (len(x),), positive=True))
-        spacing = self.volume ** (1.0 / x.shape[1]) if self.spacing is None else self.spacing
-        object.__setattr__(self, "spacing", self._field("spacing", spacing, (len(x),), positive=True))
-        object.__setattr__(self, "velocity", self._field("velocity", self.velocity, x.shape))
-        if self.surface is not None:
-            object.__setattr__(self, "surface", self._field("surface", self.surface, x.shape))
-
-    def _field(self, name: str, given: Any, shape: tuple[int, ...], positive: bool = False) -> np.ndarray:
-        values = np.asarray(given, dtype=float)
-        try:
-            values = np.broadcast_to(values, shape)
-        except ValueError:
-            raise ValueError(
-                f"body {self.name!r}: {name} must be a number or have shape {shape}, got {values.shape}"
-            ) from None
-        wrong = ~np.isfinite(values)
-        if positive:
-            wrong |= values <= 0.0
-        if wrong.any():
-            first = np.argwhere(wrong)[0]
-            raise ValueError(
-                f"body {self.name!r}: {name} must be {'positive and ' if positive else ''}finite, "
-                f"got {values[tuple(first)]} at particle {first[0]} ({wrong.sum()} such values)"
-            )
-        return values.copy()
 
 
 class Simulation:
@@ -127,6 +67,7 @@ class Simulation:
         self.device = wp.get_device(device)
         self.boundaries = tuple(boundaries)
         check_reference([body.material for body in self.bodies], reference)
+        self.dilation = dilation
         if not (np.isfinite(dilation) and dilation > 0.0):
             raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
         box = _checked_box(periodic, self.space.dim)
@@ -154,7 +95,7 @@ class Simulation:
         )
         self._check_neighbourhoods(X)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
-        self._output: Any = None
+        self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
         self._longest_dt = 0.0
 
     # what a run does
@@ -165,22 +106,29 @@ class Simulation:
         Args:
             until: end time [s], not before the present time.
             every: time between frames [s]; the first frame is the present state, the last the end.
-            output: directory for snapshots, or an object with ``write(simulation)``; asked once per frame.
+            output: directory of the run, which can be resumed (``output.record``); what it held moves to ``abandoned/``
+                there. Or an object with ``write(simulation)``, asked once per frame.
 
         Raises:
             UnstableError: det F ≤ 0 or non-finite values; the last good frame stays on disk.
+            OSError: the directory cannot be written.
         """
         if not (np.isfinite(until) and until >= self.t):
             raise ValueError(f"until must be finite and not before the present time {self.t} s, got {until}")
+        frames = AtTimes() if every is None else EveryTime(every, self.t)
         if output is None:
             self._advance(until)
-            return
-        self._output = _writer(output)
-        self._output.write(self)
-        for _ in self.frames(_frame_times(self.t, until, every)):
-            self._output.write(self)
+        elif hasattr(output, "write"):
+            self.output = output
+            output.write(self)
+            for _ in self.frames(targets(frames, self.t, until)):
+                output.write(self)
+        else:
+            from .output import Recording, record
 
-    def frames(self, times: Sequence[float]) -> Iterator[float]:
+            record(self, output, until, Recording(snapshots=frames), replace=True)
+
+    def frames(self, times: Iterable[float]) -> Iterator[float]:
         """Step through increasing ``times`` [s], yielding each when it is reached exactly."""
         for time in times:
             self._advance(time)
@@ -193,13 +141,53 @@ class Simulation:
             self.stepper.step()
         self._raise_if_bad()
 
-    def _advance(self, until: float) -> None:
+    def advance(self, until: float, most: int | None = None) -> None:
+        """Take the steps between two looks at the clock towards ``until`` [s], at most ``most`` steps.
+
+        Raises:
+            UnstableError: det F ≤ 0 or non-finite values.
+        """
         self.clock.aim(until)
         batch = STEPS_BETWEEN_LOOKS if self.device.is_cuda else 1
+        for _ in range(batch if most is None else min(batch, most)):
+            self.stepper.step()
+        self._raise_if_bad()
+
+    def _advance(self, until: float) -> None:
         while self.t < until:
-            for _ in range(batch):
-                self.stepper.step()
-            self._raise_if_bad()
+            self.advance(until)
+
+    # what a checkpoint holds
+
+    def evolving(self) -> dict[str, wp.array]:
+        """Every array that a step reads before it writes it, by name."""
+        return self.stepper.evolving()
+
+    @property
+    def counters(self) -> dict[str, float]:
+        """The numbers beside the arrays that evolve: steps taken, starting energy [J], longest step so far [s]."""
+        return {"steps": self.steps, "start": self.stepper.ledger.start, "longest_dt": self._longest_dt}
+
+    def restore(self, arrays: Mapping[str, np.ndarray], counters: Mapping[str, float]) -> None:
+        """Take over what ``evolving`` and ``counters`` were in this same simulation, at any step of it.
+
+        Raises:
+            ValueError: names or shapes that are not those of this simulation; nothing was changed.
+        """
+        own = self.evolving()
+        shapes = {name: array.numpy().shape for name, array in own.items()}
+        given = {name: array.shape for name, array in arrays.items()}
+        wrong = sorted(name for name in shapes.keys() | given.keys() if shapes.get(name) != given.get(name))
+        if wrong or counters.keys() != self.counters.keys():
+            raise ValueError(
+                f"restore: arrays must have names and shapes of this simulation, {wrong[0] if wrong else 'counters'} "
+                f"differs: {given.get(wrong[0]) if wrong else set(counters)}; build the simulation as it was"
+            )
+        for name, array in own.items():
+            array.assign(arrays[name])
+        self.stepper.steps = int(counters["steps"])
+        self.stepper.ledger.start, self._longest_dt = counters["start"], counters["longest_dt"]
+        self.stepper.rebuild()
 
     # what a user looks at
 
@@ -330,8 +318,8 @@ class Simulation:
         else:
             return
         kept = "no snapshot was written"
-        if getattr(self._output, "last", None) is not None:
-            kept = f"the last good snapshot is {self._output.last}"
+        if getattr(self.output, "last", None) is not None:
+            kept = f"the last good snapshot is {self.output.last}"
         raise UnstableError(
             f"unstable at t = {self.t:.8g} s, step {self.steps}: particle {particle} "
             f"{self._where(particle, self.x)} has "
@@ -364,24 +352,3 @@ def _checked_box(periodic: Sequence[float] | None, dim: int) -> tuple[float, ...
     if len(box) != dim or not all(np.isfinite(length) and length >= 0.0 for length in box):
         raise ValueError(f"periodic must be {dim} lengths [m], 0 where the box is open, got {periodic}")
     return box
-
-
-def _frame_times(start: float, until: float, every: float | None) -> list[float]:
-    if every is None:
-        return [until]
-    if not (np.isfinite(every) and every > 0.0):
-        raise ValueError(f"every must be a positive time [s], got {every}")
-    count = int(np.floor((until - start) / every * (1.0 + 1e-12)))
-    times = [start + every * k for k in range(1, count + 1)]
-    if not times or times[-1] < until - 1e-9 * every:
-        times.append(until)
-    times[-1] = min(times[-1], until)
-    return times
-
-
-def _writer(output: Any) -> Any:
-    if hasattr(output, "write"):
-        return output
-    from .output import SnapshotWriter
-
-    return SnapshotWriter(output)

@@ -105,6 +105,10 @@ class Bound:
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         """Add forces [N] at time t + fraction · Δt to ``external``."""
 
+    def evolving(self) -> dict[str, wp.array]:
+        """Arrays by name that a step reads before it writes them: what a checkpoint must hold of the condition."""
+        return {}
+
 
 def unit_vector(given: Sequence[float], dim: int, who: str) -> np.ndarray:
     """``given`` at length one, (dim,).

@@ -16,7 +16,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("output", metavar="FILE", help="file to write: .vtkhdf, .xdmf, .csv or .npz")
     parser.add_argument("-f", "--fields", metavar="NAMES", help="fields with commas between them; default all")
     parser.add_argument("--frames", default=":", metavar="WHICH", help="such as -1, 0,5,10 or ::2; default all")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run_command=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

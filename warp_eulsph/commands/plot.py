@@ -30,7 +30,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--size", type=_numbers(2, int), default=(1000, 700), metavar="W,H", help="pixels")
     parser.add_argument("--view", type=_numbers(3), metavar="X,Y,Z", help="where 3-D is looked at from; y points up")
     parser.add_argument("--fps", type=float, default=10.0, help="frames per second of a film; default %(default)s")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run_command=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         description="Print the JSON Schema of case files. An editor that knows TOML schemas then completes and checks: "
         "write it to case.schema.json and begin case files with '#:schema ./case.schema.json'.",
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run_command=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,7 +1,42 @@
 """What a run leaves on disk and says about itself; the only room that knows HDF5."""
 
+from .checkpoint import DamagedError
+from .directory import BusyError, RunDirectory
+from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
+from .reader import Comparison, Run, RunFrame
+from .record import ChangedCaseError, Outcome, record
+from .recording import Recording
+from .recover import Findings, check, recover
 from .report import Figure, table
 from .series import SnapshotWriter
 from .snapshot import FIELDS, Snapshot, read_snapshot, write_snapshot
+from .stopping import Stop
 
-__all__ = ["FIELDS", "Figure", "Snapshot", "SnapshotWriter", "read_snapshot", "table", "write_snapshot"]
+__all__ = [
+    "FIELDS",
+    "BodyProbe",
+    "BusyError",
+    "ChangedCaseError",
+    "Comparison",
+    "DamagedError",
+    "Figure",
+    "Findings",
+    "Outcome",
+    "PointProbe",
+    "Probe",
+    "ReactionProbe",
+    "Recording",
+    "Run",
+    "RunDirectory",
+    "RunFrame",
+    "SectionProbe",
+    "Snapshot",
+    "SnapshotWriter",
+    "Stop",
+    "check",
+    "read_snapshot",
+    "record",
+    "recover",
+    "table",
+    "write_snapshot",
+]

@@ -10,38 +10,69 @@ import numpy as np
 
 from ..simulation import Simulation
 from .atomic import replace_file
-from .snapshot import chosen_fields, write_snapshot
+from .directory import RunDirectory
+from .manifest import Manifest, entry_of
+from .snapshot import Frame, checked_precision, chosen_fields, collect, encode
+from .temporal import write_index
+
+# The index names every snapshot, so that making it costs more from frame to frame: a tenth more of them is worth it.
+_GROWTH = 1.1
 
 
 class SnapshotWriter:
-    """Writes ``snap/0000001200.vtkhdf`` for step 1200 and keeps ``run.vtkhdf.series`` listing them with their times.
+    """Writes ``snap/0000001200.vtkhdf`` for step 1200, its line in ``manifest.jsonl``, and the lists for ParaView.
 
-    Open the ``.series`` file in ParaView to see the run. A new writer starts a new list; snapshots that an older run
-    left in the directory are replaced when their step comes round again, and not listed.
+    ``run.vtkhdf.series`` lists the snapshots with their times; ``run.vtkhdf`` is one file over all of them, renewed
+    when a tenth more have come and by ``finish``. A new writer starts a new run: what an older one left in the
+    directory moves to ``abandoned/`` there.
 
     Attributes:
+        manifest: of the snapshots written.
         last: path of the last snapshot written, None before the first.
 
     Args:
         directory: of the run; made if absent.
         fields: names of ``snapshot.FIELDS``; all if None.
         dtype: ``np.float32`` or ``np.float64`` of the stored reals.
+        resume: go on after the snapshots that are there.
 
     Raises:
-        ValueError: unknown field.
+        ValueError: unknown field or dtype.
     """
 
-    def __init__(self, directory: str | PathLike, fields: Iterable[str] | None = None, *, dtype: Any = np.float32):
+    def __init__(
+        self,
+        directory: str | PathLike,
+        fields: Iterable[str] | None = None,
+        *,
+        dtype: Any = np.float32,
+        resume: bool = False,
+    ):
         self.directory = Path(directory)
-        self.fields, self.dtype = chosen_fields(fields), dtype
-        self.frames: list[tuple[str, float]] = []
-        self.last: Path | None = None
+        self.fields, self.dtype = chosen_fields(fields), checked_precision(dtype)
+        self.manifest = Manifest(self.directory)
+        self._indexed = 0
+        if not resume:
+            RunDirectory(self.directory).abandon()
         (self.directory / "snap").mkdir(parents=True, exist_ok=True)
+        if resume:
+            self.manifest.load()
+            self._indexed = len(self.manifest.entries)
+
+    @property
+    def last(self) -> Path | None:
+        """Path of the last snapshot written, None before the first."""
+        return self.directory / self.manifest.entries[-1].name if self.manifest.entries else None
 
     @property
     def series(self) -> Path:
         """The list for ParaView."""
         return self.directory / "run.vtkhdf.series"
+
+    @property
+    def index(self) -> Path:
+        """The file over all snapshots, for ParaView."""
+        return self.directory / "run.vtkhdf"
 
     def write(self, simulation: Simulation) -> Path:
         """Write the present state; the path of its file.
@@ -49,15 +80,49 @@ class SnapshotWriter:
         Raises:
             OSError: the disk refused; the files written before are whole.
         """
-        name = f"snap/{simulation.steps:010d}.vtkhdf"
-        write_snapshot(self.directory / name, simulation, self.fields, dtype=self.dtype)
-        if not self.frames or self.frames[-1][0] != name:  # a frame written twice is listed once
-            self.frames.append((name, simulation.t))
-        listing = {"file-series-version": "1.0", "files": [{"name": f, "time": t} for f, t in self.frames]}
-        replace_file(self.series, lambda temporary: _write_text(temporary, json.dumps(listing, indent=1) + "\n"))
-        self.last = self.directory / name
-        return self.last
+        return self.commit(collect(simulation, self.fields))
 
+    def commit(self, frame: Frame) -> Path:
+        """Write a frame collected before; the path of its file.
 
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+        Raises:
+            OSError: the disk refused; the files written before are whole.
+        """
+        name, content = f"snap/{frame.step:010d}.vtkhdf", encode(frame, self.dtype)
+        replace_file(self.directory / name, content)
+        self.manifest.add(entry_of(name, frame.step, frame.time, len(frame.x), content))
+        self._write_series()
+        if len(self.manifest.entries) > _GROWTH * self._indexed:
+            self._write_index()
+        return self.directory / name
+
+    def finish(self) -> None:
+        """Bring the index up to date.
+
+        Raises:
+            OSError: the disk refused; the snapshots are whole.
+        """
+        if len(self.manifest.entries) != self._indexed:
+            self._write_index()
+
+    def derive(self) -> None:
+        """Write the lists anew from the manifest, or remove them when there are no snapshots.
+
+        Raises:
+            OSError: the disk refused; the snapshots are whole.
+        """
+        if self.manifest.entries:
+            self._write_series()
+            self._write_index()
+        else:
+            for path in (self.series, self.index):
+                path.unlink(missing_ok=True)
+
+    def _write_series(self) -> None:
+        files = [{"name": entry.name, "time": entry.time} for entry in self.manifest.entries]
+        listing = {"file-series-version": "1.0", "files": files}
+        replace_file(self.series, (json.dumps(listing, indent=1) + "\n").encode())
+
+    def _write_index(self) -> None:
+        write_index(self.index, self.manifest.entries)
+        self._indexed = len(self.manifest.entries)

@@ -1,5 +1,6 @@
 """One frame, one immutable file: plain HDF5 that is a static VTKHDF PolyData too (ParaView, VTK, PyVista, h5py)."""
 
+import io
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from os import PathLike
@@ -20,10 +21,10 @@ class SnapshotField(NamedTuple):
     shape: Callable[[int], tuple[int, ...]]
     unit: str
     meaning: str
-    values: Callable[["_Frame"], np.ndarray]
+    values: Callable[["_State"], np.ndarray]
 
 
-class _Frame:
+class _State:
     """The present state on the host; what several fields need is computed once."""
 
     def __init__(self, simulation: Simulation):
@@ -39,31 +40,34 @@ class _Frame:
         return self._stress
 
 
-def _density(frame: _Frame) -> np.ndarray:
-    particles = frame.simulation.particles
-    return particles.mass.numpy() / (particles.V0.numpy() * frame.J)
+def _density(state: _State) -> np.ndarray:
+    particles = state.simulation.particles
+    return particles.mass.numpy() / (particles.V0.numpy() * state.J)
 
 
 #: Every field that a snapshot can hold. Stress has nine components in any dimension: σ33 of plane strain counts.
 FIELDS = {
-    "velocity": SnapshotField(lambda d: (d,), STATE["v"].unit, STATE["v"].meaning, lambda f: f.simulation.v),
+    "velocity": SnapshotField(lambda d: (d,), STATE["v"].unit, STATE["v"].meaning, lambda s: s.simulation.v),
     "deformation_gradient": SnapshotField(
-        lambda d: (d, d), STATE["F"].unit, STATE["F"].meaning + "; missing stretches are 1", lambda f: f.F
+        lambda d: (d, d), STATE["F"].unit, STATE["F"].meaning + "; missing stretches are 1", lambda s: s.F
     ),
-    "J": SnapshotField(lambda d: (), "-", "volume over initial volume, det F", lambda f: f.J),
-    "cauchy_stress": SnapshotField(lambda d: (3, 3), "Pa", "Cauchy stress", lambda f: f.stress),
+    "J": SnapshotField(lambda d: (), "-", "volume over initial volume, det F", lambda s: s.J),
+    "cauchy_stress": SnapshotField(lambda d: (3, 3), "Pa", "Cauchy stress", lambda s: s.stress),
     "pressure": SnapshotField(
-        lambda d: (), "Pa", "pressure, minus a third of the trace of the stress", lambda f: -np.trace(f.stress.T) / 3.0
+        lambda d: (), "Pa", "pressure, minus a third of the trace of the stress", lambda s: -np.trace(s.stress.T) / 3.0
     ),
     "density": SnapshotField(lambda d: (), "kg/m^3", "density", _density),
     "body": SnapshotField(
-        lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, lambda f: f.simulation.particles.body.numpy()
+        lambda d: (),
+        PARTICLES["body"].unit,
+        PARTICLES["body"].meaning,
+        lambda s: s.simulation.particles.body.numpy().copy(),
     ),
     "share": SnapshotField(
         lambda d: (),
         PARTICLES["share"].unit,
         PARTICLES["share"].meaning,
-        lambda f: f.simulation.particles.share.numpy(),
+        lambda s: s.simulation.particles.share.numpy().copy(),
     ),
 }
 
@@ -100,6 +104,40 @@ def chosen_fields(names: Iterable[str] | None) -> list[str]:
     return wanted
 
 
+@dataclass(frozen=True)
+class Frame:
+    """A state on the host, ready to be written while the simulation goes on.
+
+    Attributes:
+        time: [s]. step: steps taken. dim: dimension.
+        x: positions [m], (n, dim). values: fields by name, in their natural shape.
+    """
+
+    time: float
+    step: int
+    dim: int
+    x: np.ndarray
+    values: dict[str, np.ndarray]
+
+
+def collect(simulation: Simulation, names: Iterable[str]) -> Frame:
+    """The present state's fields of these ``names``, copied."""
+    source = _State(simulation)
+    values = {name: FIELDS[name].values(source) for name in names}
+    return Frame(simulation.t, simulation.steps, simulation.space.dim, simulation.x, values)
+
+
+def checked_precision(dtype: Any) -> np.dtype:
+    """The dtype that reals are stored in.
+
+    Raises:
+        ValueError: neither ``np.float32`` nor ``np.float64``.
+    """
+    if np.dtype(dtype) not in (np.dtype(np.float32), np.dtype(np.float64)):
+        raise ValueError(f"dtype must be numpy.float32 or numpy.float64, got {dtype}")
+    return np.dtype(dtype)
+
+
 def write_snapshot(
     path: str | PathLike, simulation: Simulation, fields: Iterable[str] | None = None, *, dtype: Any = np.float32
 ) -> None:
@@ -115,38 +153,36 @@ def write_snapshot(
         ValueError: unknown field or dtype.
         OSError: nothing was written; what ``path`` held before is still there.
     """
-    if np.dtype(dtype) not in (np.dtype(np.float32), np.dtype(np.float64)):
-        raise ValueError(f"dtype must be numpy.float32 or numpy.float64, got {dtype}")
-    names = chosen_fields(fields)
-    frame = _Frame(simulation)
-    values = {name: FIELDS[name].values(frame) for name in names}
-    replace_file(Path(path), lambda temporary: _write(temporary, simulation, values, np.dtype(dtype)))
+    precision = checked_precision(dtype)
+    replace_file(Path(path), encode(collect(simulation, chosen_fields(fields)), precision))
 
 
-def _write(path: Path, simulation: Simulation, values: dict[str, np.ndarray], dtype: np.dtype) -> None:
+def encode(frame: Frame, dtype: np.dtype) -> bytes:
+    """The file of a frame, made in memory: HDF5 itself leaves wrecks on a full disk, and errors that come too late."""
     import h5py
 
-    x, dim = simulation.x, simulation.space.dim
-    n = len(x)
+    dim, n = frame.dim, len(frame.x)
+    memory = io.BytesIO()
     # VTK's HDF5 is older than h5py's: newer file formats than 1.10's do not open there.
-    with h5py.File(path, "w", libver=("earliest", "v110")) as file:
-        file.attrs["time"], file.attrs["time_unit"] = np.float64(simulation.t), "s"
-        file.attrs["step"], file.attrs["dimension"] = np.int64(simulation.steps), np.int64(dim)
+    with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
+        file.attrs["time"], file.attrs["time_unit"] = np.float64(frame.time), "s"
+        file.attrs["step"], file.attrs["dimension"] = np.int64(frame.step), np.int64(dim)
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 2], dtype=np.int64)
         root.attrs["Type"] = np.bytes_("PolyData")  # fixed-length ASCII; VTK reads no other kind
         root["NumberOfPoints"] = np.array([n], dtype=np.int64)
         points = np.zeros((n, 3), dtype=dtype)
-        points[:, :dim] = x
+        points[:, :dim] = frame.x
         root["Points"] = points
         root["Points"].attrs["unit"] = STATE["x"].unit
         _write_cells(root, n)
         data = root.create_group("PointData")
-        for name, value in values.items():
+        for name, value in frame.values.items():
             _write_field(data, name, value, dim, dtype)
-        _mark_active(data, values)
-        root["FieldData/TimeValue"] = np.array([simulation.t])  # the name VTK gives to a data set's time
-        root["FieldData/Step"] = np.array([simulation.steps], dtype=np.int64)
+        _mark_active(data, frame.values)
+        root["FieldData/TimeValue"] = np.array([frame.time])  # the name VTK gives to a data set's time
+        root["FieldData/Step"] = np.array([frame.step], dtype=np.int64)
+    return memory.getvalue()
 
 
 def _write_cells(root: Any, n: int) -> None:
@@ -191,20 +227,52 @@ def read_snapshot(path: str | PathLike) -> Snapshot:
     import h5py
 
     with h5py.File(path, "r") as file:
-        missing = [key for key in ("time", "step", "dimension") if key not in file.attrs]
-        if missing or "VTKHDF/PointData" not in file:
-            raise ValueError(f"{path} is not a snapshot of this package: missing {missing or 'VTKHDF/PointData'}")
-        dim = int(file.attrs["dimension"])
-        fields, units = {}, {}
-        for name, dataset in file["VTKHDF/PointData"].items():
-            fields[name] = _natural(dataset[()], tuple(int(i) for i in dataset.attrs["shape"]))
-            units[name] = str(dataset.attrs["unit"])
-        x = file["VTKHDF/Points"][:, :dim]
-        return Snapshot(float(file.attrs["time"]), int(file.attrs["step"]), x, fields, units)
+        _check(path, file)
+        data = file["VTKHDF/PointData"]
+        fields = {name: _natural(dataset) for name, dataset in data.items()}
+        units = {name: str(dataset.attrs["unit"]) for name, dataset in data.items()}
+        return Snapshot(float(file.attrs["time"]), int(file.attrs["step"]), _positions(file), fields, units)
 
 
-def _natural(stored: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def read_units(path: str | PathLike) -> dict[str, str]:
+    """Fields of a snapshot besides the positions, with their units; raises like ``read_snapshot``."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        _check(path, file)
+        return {name: str(dataset.attrs["unit"]) for name, dataset in file["VTKHDF/PointData"].items()}
+
+
+def read_field(path: str | PathLike, name: str) -> np.ndarray:
+    """One field of a snapshot in its natural shape, ``x`` the positions; raises like ``read_snapshot``.
+
+    Raises:
+        KeyError: the snapshot has no such field.
+    """
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        _check(path, file)
+        if name == "x":
+            return _positions(file)
+        if name not in file["VTKHDF/PointData"]:
+            raise KeyError(f"{path} holds no {name!r}, only {['x', *file['VTKHDF/PointData']]}")
+        return _natural(file["VTKHDF/PointData"][name])
+
+
+def _check(path: str | PathLike, file: Any) -> None:
+    missing = [key for key in ("time", "step", "dimension") if key not in file.attrs]
+    if missing or "VTKHDF/PointData" not in file:
+        raise ValueError(f"{path} is not a snapshot of this package: missing {missing or 'VTKHDF/PointData'}")
+
+
+def _positions(file: Any) -> np.ndarray:
+    return file["VTKHDF/Points"][:, : int(file.attrs["dimension"])]
+
+
+def _natural(dataset: Any) -> np.ndarray:
     """Stored rows without the padding."""
+    stored, shape = dataset[()], tuple(int(i) for i in dataset.attrs["shape"])
     if len(shape) == 1:
         return stored[:, : shape[0]]
     if len(shape) == 2:

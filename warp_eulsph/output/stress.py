@@ -34,7 +34,8 @@ def _make_cauchy(space: Space, law: Law) -> Any:
     return cauchy
 
 
-def _body_stress(material: Material, F: np.ndarray, real: type, device: Any) -> np.ndarray:
+def body_stress(material: Material, F: np.ndarray, real: type, device: Any) -> np.ndarray:
+    """σ of deformation gradients ``F`` (n, dim, dim) of one material [Pa], (n, 3, 3)."""
     try:
         space = Space(3, real)
         law = material.law(space)
@@ -59,4 +60,4 @@ def cauchy_stress(simulation: Simulation) -> np.ndarray:
     F, real, device = simulation.F, simulation.space.real, simulation.device
     ends = np.cumsum([len(body.x) for body in simulation.bodies])[:-1]
     parts = zip(simulation.bodies, np.split(F, ends), strict=True)
-    return np.concatenate([_body_stress(body.material, F_body, real, device) for body, F_body in parts])
+    return np.concatenate([body_stress(body.material, F_body, real, device) for body, F_body in parts])

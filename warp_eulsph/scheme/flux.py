@@ -172,6 +172,10 @@ class Flux:
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.histories = [part.history for part in self.parts]
 
+    def evolving(self) -> dict[str, wp.array]:
+        """The histories of the materials that have one, by body; what a checkpoint must hold."""
+        return {f"Flux.history.{i}": history for i, history in enumerate(self.histories) if history is not None}
+
     def compute(self, F: wp.array, reference: Any) -> None:
         """Q and Π = Q L of the deformation gradients ``F`` (M1, M5)."""
         for part in self.parts:

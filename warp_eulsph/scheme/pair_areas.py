@@ -176,6 +176,10 @@ class ClosedPairs(Stabiliser):
             wp.launch(_make_remove_mean(self.space), len(body), arguments, device=self.device)
             self.solver.solve(configuration.fields, configuration.near, body, self.option.iterations)
 
+    def evolving(self) -> dict[str, wp.array]:
+        """The potentials: in use until the next refresh, whose first guess they are."""
+        return {"ClosedPairs.psi": self.solver.psi}
+
     def compute(
         self,
         configuration: Configuration,

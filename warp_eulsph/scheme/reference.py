@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..fields import allocate, neighbour_structure, structure
+from ..fields import allocate, arrays, neighbour_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
 from ..operators.correction import make_correct, make_pair_sums
 from ..operators.divergence import make_divergence
@@ -183,10 +183,18 @@ class Configuration:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
         n = len(state.x)
         wp.launch(_make_adopt(self.space), n, [state, self.particles, self.fields], device=self.device)
+        self.rebuild()
+        wp.launch(make_correct(self.space), n, [self.K, self.fields, self.poor], device=self.device)
+
+    def evolving(self) -> dict[str, wp.array]:
+        """The reference's arrays by name: what a checkpoint must hold; ``rebuild`` derives the rest from them."""
+        return arrays(self.fields, "Reference")
+
+    def rebuild(self) -> None:
+        """Neighbours, pair weights, K_a (M3) and interpolations of the positions, volumes and h in ``fields``."""
         self.lists.build(self.fields.x)
         sums = [self.particles, self.fields, self.near, self.K]
-        wp.launch(make_pair_sums(self.weight, self.space), n, sums, device=self.device)
-        wp.launch(make_correct(self.space), n, [self.K, self.fields, self.poor], device=self.device)
+        wp.launch(make_pair_sums(self.weight, self.space), len(self.K), sums, device=self.device)
         for interpolation in self._interpolations.values():
             interpolation.refresh()
 

@@ -15,6 +15,10 @@ class Stabiliser(ABC):
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Prepare for a new reference."""
 
+    def evolving(self) -> dict[str, wp.array]:
+        """Arrays by name that live from step to step: what a checkpoint must hold."""
+        return {}
+
     @abstractmethod
     def compute(
         self,

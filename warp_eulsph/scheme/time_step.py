@@ -91,6 +91,10 @@ class DeviceClock:
         self.fields.rate = wp.zeros(1, dtype=space.real, device=device)
         self.fields.bad = wp.full(1, WELL, dtype=wp.int32, device=device)
 
+    def evolving(self) -> dict[str, wp.array]:
+        """The clock's arrays by name: what a checkpoint must hold."""
+        return {f"Clock.{name}": getattr(self.fields, name) for name in ("t", "dt", "free_dt", "target", "rate", "bad")}
+
     @property
     def t(self) -> float:
         """Time [s]; reads the device."""

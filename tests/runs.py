@@ -1,0 +1,73 @@
+"""A small run with everything on, for the tests of run directories."""
+
+import json
+
+import numpy as np
+
+import warp_eulsph as es
+from warp_eulsph.output import BodyProbe, PointProbe, ReactionProbe, Recording, SectionProbe, record
+from warp_eulsph.output.checkpoint import decode
+from warp_eulsph.output.tables import read_table
+from warp_eulsph.schedule import EverySteps, EveryTime
+
+UNTIL = 2e-3
+
+
+def plate(young=17e6, reference=es.Every(3)):
+    """A plate of 36 particles, held at one end and driven at the other; the simulation and both conditions."""
+    s = (np.arange(6) + 0.5) / 6
+    x = np.stack(np.meshgrid(s, s, indexing="ij"), -1).reshape(-1, 2)
+    rubber = es.NeoHookean(density=1100.0, young=young, poisson=0.45)
+    body = es.Body(x=x, volume=1 / 36, material=rubber, velocity=20.0 * np.sin(3.0 * x[:, ::-1]), name="plate")
+    held = es.Fixed(lambda X: X[:, 0] < 1 / 6)
+    return es.Simulation(body, boundaries=[held], reference=reference, time_step=es.TimeStep(cfl=0.3))
+
+
+def recording(simulation, **changes):
+    """Snapshots by time, log and probes by steps."""
+    options = {
+        "snapshots": EveryTime(4e-4),
+        "log": EverySteps(2),
+        "probes": [
+            PointProbe(name="corner", X=(0.9, 0.9)),
+            BodyProbe(name="whole", schedule=EverySteps(3)),
+            ReactionProbe(name="hold", boundary=simulation.boundaries[0]),
+            SectionProbe(name="middle", point=(0.5, 0.5), normal=(1.0, 0.0), schedule=EveryTime(3e-4)),
+        ],
+    }
+    return Recording(**{**options, **changes})
+
+
+def run(directory, build=plate, until=UNTIL, **options):
+    """Record a fresh simulation: (simulation, outcome)."""
+    simulation = build()
+    return simulation, record(simulation, directory, until, recording(simulation), **options)
+
+
+def contents(directory):
+    """All that a run leaves that does not depend on the wall clock: bytes of files, rows of tables, and the state."""
+    found = {path.name: path.read_bytes() for path in (directory / "snap").glob("*.vtkhdf")}
+    for folder in (directory / "probes").glob("*"):
+        columns, units = read_table(folder)
+        found[folder.name] = {name: column.tobytes() for name, column in columns.items()} | units
+    for name in ("manifest.jsonl", "log.jsonl", "run.json"):
+        found[name] = (directory / name).read_text()
+    last = decode(sorted((directory / "ckpt").glob("*.ckpt"))[-1].read_bytes())
+    found["state"] = {name: array.tobytes() for name, array in last.arrays.items()} | last.counters
+    found["series"] = json.loads((directory / "run.vtkhdf.series").read_text())
+    return found
+
+
+class StopAfter:
+    """Stops a run at given steps, one at each call of ``record``."""
+
+    def __init__(self, *steps):
+        self.left, self.simulation = list(steps), None
+
+    def watch(self, simulation):
+        self.simulation = simulation
+
+    def reason(self):
+        if self.left and self.simulation is not None and self.simulation.steps >= self.left[0]:
+            return f"step {self.left.pop(0)}"
+        return None

@@ -1,0 +1,219 @@
+"""A run read back: lazily, by name, with derived fields; and by VTK, bit for bit, wherever the folder is."""
+
+import json
+import time
+
+import h5py
+import numpy as np
+import pytest
+import warp as wp
+from runs import UNTIL, plate, recording, run
+from test_snapshots import pad
+
+import warp_eulsph as es
+from warp_eulsph.output import Recording, Run, SnapshotWriter, read_snapshot, record
+from warp_eulsph.output.manifest import Manifest, entry_of
+from warp_eulsph.schedule import EverySteps, EveryTime
+
+
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("runs") / "plate"
+    simulation = plate()
+    record(simulation, directory, UNTIL, recording(simulation, dtype=np.float64))
+    return directory
+
+
+def test_frames_by_index_time_and_slice(directory):
+    run = Run(directory)
+    assert len(run) == len(run.times) == 6 and [frame.time for frame in run] == run.times.tolist()
+    assert run[-1].time == UNTIL and run[0].step == 0 == run.steps[0]
+    assert [frame.step for frame in run[1:3]] == run.steps[1:3].tolist()
+    assert run.at(8.1e-4).time == 8e-4
+    with pytest.raises(IndexError):
+        run[6]
+    assert repr(run[0]) == "<frame of step 0, t = 0 s, 36 particles>"
+
+
+def test_fields_have_their_natural_shapes_and_units(directory):
+    run = Run(directory)
+    frame, snapshot = run[-1], read_snapshot(run[-1].path)
+    assert frame.F.shape == (36, 2, 2) and frame.x.shape == frame.v.shape == (36, 2)
+    assert frame.cauchy_stress.shape == (36, 3, 3)
+    for name, values in snapshot.fields.items():
+        assert np.array_equal(frame[name], values)
+    assert np.array_equal(frame.x, snapshot.x)
+    assert run.units == {**snapshot.units, "x": "m", **{k: run.units[k] for k in run.fields if k not in frame.units}}
+    assert run.units["von_mises"] == "Pa" and run.units["velocity"] == "m/s"
+    assert frame.F is frame.F  # read once
+    with pytest.raises(KeyError, match="holds no 'temperature', only"):
+        frame["temperature"]
+
+
+def test_derived_fields(directory):
+    frame = Run(directory)[-1]
+    s = frame.cauchy_stress
+    first = s[7]
+    by_hand = np.sqrt(
+        0.5 * ((first[0, 0] - first[1, 1]) ** 2 + (first[1, 1] - first[2, 2]) ** 2 + (first[2, 2] - first[0, 0]) ** 2)
+        + 3.0 * (first[0, 1] ** 2 + first[1, 2] ** 2 + first[0, 2] ** 2)
+    )
+    assert frame.von_mises[7] == pytest.approx(by_hand, rel=1e-12)
+    assert frame.pressure == pytest.approx(-(s[:, 0, 0] + s[:, 1, 1] + s[:, 2, 2]) / 3, rel=1e-12)
+    assert frame.principal_stretches.prod(axis=1) == pytest.approx(frame.J, rel=1e-12)
+    assert (np.diff(frame.principal_stresses) >= 0.0).all()
+    assert frame.principal_stresses.sum(axis=1) == pytest.approx(-3 * frame.pressure, rel=1e-9)
+    C = np.einsum("nki,nkj->nij", frame.F, frame.F)
+    assert frame.green_lagrange == pytest.approx(0.5 * (C - np.eye(2)), abs=1e-14)
+
+
+def test_some_fields_only(tmp_path):
+    record(plate(), tmp_path, 1e-4, Recording(fields=["deformation_gradient", "cauchy_stress"]))
+    run = Run(tmp_path)
+    assert run.fields == [
+        *("x", "cauchy_stress", "deformation_gradient"),
+        *("von_mises", "principal_stresses", "principal_stretches", "green_lagrange"),
+    ]
+    assert pytest.approx(np.linalg.det(run[-1].F), rel=1e-6) == run[-1].J
+    assert run[-1].pressure.shape == (36,)
+
+
+def test_log_probes_and_description(directory):
+    run = Run(directory)
+    assert run.log["t"][-1] == UNTIL and run.log["momentum"].shape == (len(run.log["t"]), 2)
+    assert run.probe_names == ["corner", "hold", "middle", "whole"]
+    assert len(run.probes["corner"]["t"]) == run.steps[-1] + 1
+    assert run.description["simulation"]["dimension"] == 2 and run.state == "done"
+    assert run.environment["sessions"][0]["device"]["kind"] == "cpu"
+
+
+def test_comparison_of_two_runs(directory, tmp_path):
+    simulation = plate(reference=es.Always())
+    record(simulation, tmp_path, UNTIL, Recording(snapshots=EveryTime(8e-4)))
+    found = Run(directory).compare(Run(tmp_path), fields=("x", "von_mises"))
+    assert found.times.tolist() == [0.0, 8e-4, 1.6e-3, 2e-3]
+    apart = np.linalg.norm(Run(directory)[-1].x - Run(tmp_path)[-1].x, axis=1)
+    assert found.largest["x"][-1] == apart.max() > found.rms["x"][-1] == pytest.approx(np.sqrt((apart**2).mean()))
+    same = Run(directory).compare(Run(directory))
+    assert not same.largest["x"].any()
+    lonely = SnapshotWriter(tmp_path / "lonely")
+    simulation.step()
+    lonely.write(simulation)
+    with pytest.raises(ValueError, match="no time in common"):
+        Run(directory).compare(Run(tmp_path / "lonely"))
+
+
+def test_no_run_is_an_error(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no run in"):
+        Run(tmp_path)
+
+
+def test_run_without_its_manifest_opens(directory, tmp_path):
+    (tmp_path / "snap").mkdir()
+    for path in (directory / "snap").iterdir():
+        (tmp_path / "snap" / path.name).write_bytes(path.read_bytes())
+    assert Run(tmp_path).times.tolist() == Run(directory).times.tolist()
+    assert not (tmp_path / "manifest.jsonl").exists()  # reading writes nothing
+
+
+def test_a_running_run_can_be_read_and_a_killed_one_is_told(tmp_path):
+    states = []
+
+    def watch(simulation):
+        (tmp_path / "manifest.jsonl").open("a").close()
+        states.append((Run(tmp_path).state, len(Run(tmp_path))))
+
+    run(tmp_path, until=1e-3, watch=watch)
+    assert {state for state, _ in states} == {"running"} and states[-1][1] >= 1
+    status = json.loads((tmp_path / "status.json").read_text()) | {"state": "running"}
+    (tmp_path / "status.json").write_text(json.dumps(status))
+    assert Run(tmp_path).state == "killed"
+
+
+def test_opening_a_thousand_snapshots_takes_half_a_second(tmp_path):
+    simulation = plate()
+    writer = SnapshotWriter(tmp_path)
+    content = writer.write(simulation).read_bytes()
+    entries = [entry_of("snap/0000000000.vtkhdf", 0, 0.0, 36, content)]
+    for step in range(1, 1000):
+        name = f"snap/{step:010d}.vtkhdf"
+        (tmp_path / name).write_bytes(content)
+        entries.append(entry_of(name, step, 1e-3 * step, 36, content))
+    Manifest(tmp_path).replace(entries)
+    begin = time.process_time()
+    run = Run(tmp_path)
+    assert len(run) == len(run.times) == 1000 and run[500].F.shape == (36, 2, 2)
+    assert time.process_time() - begin < 0.5
+
+
+def vtk_steps(path):
+    """Every step of the temporal index by VTK: (time, poly data)."""
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+    assert reader.GetNumberOfSteps() == len(times)
+    for k, time_ in enumerate(times):
+        reader.SetStep(k)
+        reader.Update()
+        yield time_, reader.GetOutput()
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_vtk_reads_the_index_bit_for_bit_after_a_move(dim, dtype, tmp_path, monkeypatch):
+    from test_snapshots import simulate
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    simulation = simulate(dim)
+    record(simulation, tmp_path / "here", 3e-3, Recording(snapshots=EverySteps(1), dtype=dtype))
+    (tmp_path / "here").rename(tmp_path / "there")
+    monkeypatch.chdir("/")
+    run = Run(tmp_path / "there")
+    assert len(run) >= 3
+    for frame, (time_, data) in zip(run, vtk_steps(tmp_path / "there" / "run.vtkhdf"), strict=True):
+        assert time_ == frame.time and data.GetFieldData().GetArray("Step").GetValue(0) == frame.step
+        assert data.GetNumberOfPoints() == data.GetNumberOfVerts() == data.GetNumberOfCells() == frame.N
+        assert [data.GetCell(k).GetPointId(0) for k in range(frame.N)] == list(range(frame.N))
+        points = vtk_to_numpy(data.GetPoints().GetData())
+        assert points.dtype == dtype
+        np.testing.assert_array_equal(points, pad(frame.x))
+        for name in frame.units.keys() - {"x"}:
+            array = vtk_to_numpy(data.GetPointData().GetArray(name))
+            np.testing.assert_array_equal(array, pad(frame[name]))
+        assert data.GetPointData().GetTensors() is not None and data.GetPointData().GetVectors() is not None
+
+
+def test_lost_snapshot_reads_as_not_a_number(directory, tmp_path):
+    import shutil
+
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    shutil.copytree(directory, tmp_path / "run")
+    Run(tmp_path / "run")[2].path.unlink()
+    for k, (_, data) in enumerate(vtk_steps(tmp_path / "run" / "run.vtkhdf")):
+        assert np.isnan(vtk_to_numpy(data.GetPoints().GetData())).all() == (k == 2)
+        assert (vtk_to_numpy(data.GetPointData().GetArray("body")) == -1).all() == (k == 2)
+
+
+def test_index_layout_that_old_readers_need(directory):
+    with h5py.File(directory / "run.vtkhdf") as file:
+        root = file["VTKHDF"]
+        assert root.attrs["Type"] == b"PolyData" and root.attrs["Version"].tolist() == [2, 2]
+        assert root["Points"].is_virtual and np.isnan(root["Points"].fillvalue)
+        assert {source.file_name for source in root["Points"].virtual_sources()} == {
+            f"snap/{step:010d}.vtkhdf" for step in Run(directory).steps
+        }
+        assert root["Steps/PointOffsets"].dtype == np.int64 and root["Steps"].attrs["NSteps"] == 6
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_float32_runs_are_kept_too(dim, tmp_path):
+    from test_snapshots import simulate
+
+    simulation = simulate(dim, wp.float32)
+    record(simulation, tmp_path, 1.2e-3)
+    assert np.array_equal(Run(tmp_path)[-1].F, simulation.F)

@@ -1,0 +1,47 @@
+"""Schedules: what is due when, and times that are hit exactly."""
+
+import math
+
+import pytest
+
+from warp_eulsph.schedule import AnyOf, AtTimes, EverySteps, EveryTime, next_target, targets
+
+
+def test_every_time_counts_from_its_start_without_drift():
+    every = EveryTime(0.1)
+    assert list(targets(every, 0.0, 1.0)) == [0.1 * k for k in range(1, 10)] + [1.0]
+    assert EveryTime(0.25, 0.5).next_time(0.0) == 0.5
+    assert every.due(0.1 * 3, 7) and every.due(0.3, 7) and not every.due(0.31, 7)
+    assert every.next_time(0.3) == pytest.approx(0.4)  # although 3 · 0.1 is another double than 0.3
+    assert every.steps_left(5) is None
+
+
+def test_many_intervals_end_where_they_should():
+    times = list(targets(EveryTime(1e-3), 0.0, 1.0))
+    assert len(times) == 1000 and times[-1] == 1.0 and times[499] == 0.5
+
+
+def test_every_steps():
+    every = EverySteps(4)
+    assert [step for step in range(9) if every.due(0.0, step)] == [0, 4, 8]
+    assert [every.steps_left(step) for step in (0, 1, 3, 4)] == [4, 3, 1, 4]
+    assert every.next_time(0.0) == math.inf
+
+
+def test_at_times():
+    at = AtTimes([0.2, 0.7])
+    assert list(targets(at, 0.0, 1.0)) == [0.2, 0.7, 1.0] and list(targets(at, 0.5, 0.7)) == [0.7]
+    assert at.due(0.2, 3) and not at.due(0.3, 3)
+    assert list(targets(AtTimes(), 0.0, 1.0)) == [1.0]
+
+
+def test_any_of_several():
+    both = AnyOf([EveryTime(0.3), EverySteps(5), AtTimes([0.4])])
+    assert both.next_time(0.0) == 0.3 and both.next_time(0.3) == 0.4
+    assert both.due(0.4, 1) and both.due(0.1, 5) and not both.due(0.1, 4)
+    assert both.steps_left(3) == 2 and AnyOf([AtTimes()]).steps_left(3) is None
+
+
+def test_the_end_swallows_a_target_a_hair_before_it():
+    assert next_target(EveryTime(0.1), 0.25, 0.30000000000000010) == 0.30000000000000010
+    assert next_target(EveryTime(0.1), 0.15, 0.3) == 0.2

@@ -1,0 +1,68 @@
+"""A solid as particles: what a simulation is built from."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .materials import Material
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Body:
+    """A solid as particles.
+
+    Args:
+        x: initial positions [m], (n, dim).
+        volume: initial volumes [m^dim], a number or (n,).
+        material: its law.
+        spacing: initial particle spacing [m], a number or (n,); by default volume^(1/dim).
+        velocity: initial velocities [m/s], a number, (dim,) or (n, dim).
+        surface: outward area vectors s_a [m^(dim−1)], (n, dim), or 0 for a periodic body without a surface; by default
+            the defect e_a of the initial arrangement, which on a disordered one is noise inside too. Given vectors make
+            M10, M11 and M12 work with a fixed reference as well; without them they are zero there.
+        name: for boundary conditions and output.
+
+    Raises:
+        ValueError: wrong shapes, non-finite values, volumes or spacings that are not positive.
+    """
+
+    x: np.ndarray
+    volume: Any
+    material: Material
+    spacing: Any = None
+    velocity: Any = 0.0
+    surface: Any = None
+    name: str = "body"
+
+    def __post_init__(self) -> None:
+        x = np.array(self.x, dtype=float)
+        if x.ndim != 2 or x.shape[0] == 0 or x.shape[1] not in (1, 2, 3):
+            raise ValueError(f"body {self.name!r}: x must have shape (n, 1), (n, 2) or (n, 3), got {x.shape}")
+        object.__setattr__(self, "x", x)
+        self._field("x", x, x.shape)
+        object.__setattr__(self, "volume", self._field("volume", self.volume, (len(x),), positive=True))
+        spacing = self.volume ** (1.0 / x.shape[1]) if self.spacing is None else self.spacing
+        object.__setattr__(self, "spacing", self._field("spacing", spacing, (len(x),), positive=True))
+        object.__setattr__(self, "velocity", self._field("velocity", self.velocity, x.shape))
+        if self.surface is not None:
+            object.__setattr__(self, "surface", self._field("surface", self.surface, x.shape))
+
+    def _field(self, name: str, given: Any, shape: tuple[int, ...], positive: bool = False) -> np.ndarray:
+        values = np.asarray(given, dtype=float)
+        try:
+            values = np.broadcast_to(values, shape)
+        except ValueError:
+            raise ValueError(
+                f"body {self.name!r}: {name} must be a number or have shape {shape}, got {values.shape}"
+            ) from None
+        wrong = ~np.isfinite(values)
+        if positive:
+            wrong |= values <= 0.0
+        if wrong.any():
+            first = np.argwhere(wrong)[0]
+            raise ValueError(
+                f"body {self.name!r}: {name} must be {'positive and ' if positive else ''}finite, "
+                f"got {values[tuple(first)]} at particle {first[0]} ({wrong.sum()} such values)"
+            )
+        return values.copy()

@@ -1,0 +1,149 @@
+"""Cases as the command line names them: ``case.toml``, ``case.py``, ``example:NAME``."""
+
+import ast
+import difflib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ..output import Recording
+from ..schedule import AnyOf, AtTimes, EverySteps, EveryTime
+from ..simulation import Simulation
+
+EXAMPLE = "example:"
+
+
+@dataclass(frozen=True)
+class LoadedCase:
+    """A case that can be run.
+
+    Attributes:
+        name: for a directory.
+        build: the simulation at its start.
+        until: end time [s].
+        recording: what its run keeps.
+        origin: where it came from, for ``run.json``: source, overrides, text of the file, all its settings.
+    """
+
+    name: str
+    build: Callable[[], Simulation]
+    until: float
+    recording: Callable[[Simulation], Recording]
+    origin: dict[str, Any]
+
+
+def load_case(source: str, overrides: Sequence[str] = (), device: str | None = None) -> LoadedCase:
+    """The case that ``source`` names.
+
+    Args:
+        source: a ``.toml`` file (see ``warp_eulsph.cases``), a ``.py`` file (see docs/runs.md), or ``example:NAME``.
+        overrides: ``key=value`` strings.
+        device: Warp device, instead of the case's own.
+
+    Raises:
+        ValueError: no such file or example, or one that is wrong; it says what.
+    """
+    path = _path(source)
+    if not path.is_file():
+        raise ValueError(f"no case file {path}")
+    load = {".toml": _load_toml, ".py": _load_python}.get(path.suffix)
+    if load is None:
+        raise ValueError(f"a case must be a .toml file, a .py file or {EXAMPLE}NAME, got {source!r}")
+    build, until, recording, settings = load(path, overrides, device)
+    origin = {
+        "source": source if source.startswith(EXAMPLE) else str(path.resolve()),
+        "overrides": list(overrides),
+        "device": device,
+        "text": path.read_text(encoding="utf-8"),
+        "settings": settings,
+    }
+    return LoadedCase(path.stem, build, until, recording, origin)
+
+
+def examples() -> dict[str, Path]:
+    """Case files of the examples by name: those installed with the package, or those beside it in a clone."""
+    package = Path(__file__).parents[1]
+    for folder in (package / "examples", package.parent / "examples" / "cases"):
+        if folder.is_dir():
+            return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return {}
+
+
+def _path(source: str) -> Path:
+    if not source.startswith(EXAMPLE):
+        return Path(source)
+    name, known = source.removeprefix(EXAMPLE), examples()
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"unknown example {name!r}{hint} Examples: {', '.join(known) or 'none are installed'}")
+    return known[name]
+
+
+def _load_toml(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
+    from ..cases import read_case
+
+    case = read_case(path, [*overrides, *([f"device={device}"] if device else [])])
+    return case.build, case.until, lambda simulation: recording_of(case.output), case.describe()
+
+
+def recording_of(output: Any) -> Recording:
+    """What the table ``output`` of a case file asks for."""
+    schedules: list[Any] = [AtTimes(output.at)]
+    schedules += [EveryTime(output.every)] if output.every is not None else []
+    schedules += [EverySteps(output.steps)] if output.steps is not None else []
+    dtype = np.float64 if output.precision == "double" else np.float32
+    return Recording(snapshots=AnyOf(schedules), fields=output.fields, dtype=dtype)
+
+
+def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
+    module = _module(path)
+    settings = dict(_setting(override) for override in overrides)
+    build, until = getattr(module, "build", None), getattr(module, "UNTIL", None)
+    if not callable(build) or not isinstance(until, int | float):
+        raise ValueError(f"{path} must define build(**settings) -> Simulation and UNTIL, the end time in seconds")
+    known = inspect.signature(build).parameters
+    if not any(parameter.kind is parameter.VAR_KEYWORD for parameter in known.values()):
+        wrong = [name for name in settings if name not in known]
+        if wrong:
+            raise ValueError(f"{path}: build has no setting {wrong[0]!r}; it has {list(known) or 'none'}")
+
+    def made() -> Simulation:
+        import warp as wp
+
+        with wp.ScopedDevice(device):
+            return build(**settings)
+
+    given = getattr(module, "recording", lambda simulation: Recording())
+    return made, float(until), given, settings
+
+
+def _setting(override: str) -> tuple[str, Any]:
+    name, equals, text = override.partition("=")
+    if not equals or not name.isidentifier():
+        raise ValueError(f"a setting must be key=value, got {override!r}")
+    try:
+        return name, ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return name, text
+
+
+def _module(path: Path) -> ModuleType:
+    """The file as a module; those beside it can be imported by it."""
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+    name = f"warp_eulsph_case_{path.stem}"  # which no other module has
+    specification = importlib.util.spec_from_file_location(name, path)
+    assert specification is not None and specification.loader is not None  # for a .py file there is one
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[name] = module  # Warp looks up the module of a function
+    specification.loader.exec_module(module)
+    return module

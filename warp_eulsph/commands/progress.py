@@ -1,0 +1,78 @@
+"""What a run shows while it runs: a bar on a terminal, a line every ten seconds otherwise."""
+
+import logging
+import sys
+import time
+from typing import Any
+
+from ..simulation import Simulation
+
+log = logging.getLogger(__name__)
+
+_BAR = "{percentage:5.1f}% {bar} {postfix} [{elapsed}, {remaining} left]"
+
+
+class Progress:
+    """Called after each step; a context, so that the bar is closed.
+
+    Args:
+        until: end time [s].
+        terminal: whether there is one; found out by default.
+    """
+
+    def __init__(self, until: float, terminal: bool | None = None):
+        self.until = until
+        self.terminal = sys.stderr.isatty() if terminal is None else terminal
+        self._interval = 0.5 if self.terminal else 10.0
+        self._bar: Any = None
+        self._start: tuple[float, float, int] | None = None
+        self._shown = (0.0, 0)
+
+    def __enter__(self) -> "Progress":
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def __call__(self, simulation: Simulation) -> None:
+        """Show where ``simulation`` is, if the last time was long enough ago."""
+        now = time.monotonic()
+        if self._start is None:
+            self._begin(simulation, now)
+        elif now - self._shown[0] >= self._interval or simulation.t >= self.until:
+            self._show(simulation, now)
+
+    def _begin(self, simulation: Simulation, now: float) -> None:
+        self._start, self._shown = (now, simulation.t, simulation.steps), (now, simulation.steps)
+        if self.terminal:
+            from tqdm import tqdm
+
+            left = max(self.until - simulation.t, 1e-300)
+            self._bar = tqdm(total=left, bar_format=_BAR, smoothing=0.0, leave=True)
+
+    def _show(self, simulation: Simulation, now: float) -> None:
+        assert self._start is not None  # _begin came first
+        began, first, _ = self._start
+        t, step = simulation.t, simulation.steps
+        speed = (step - self._shown[1]) * len(simulation.stepper.U.x) / max(now - self._shown[0], 1e-9)
+        self._shown = (now, step)
+        text = (
+            f"step {step}, t = {t:.4g} s, dt = {simulation.dt:.3g} s, {speed:.3g} particle-steps/s, "
+            f"energy drift {energy_drift(simulation):+.1e}"
+        )
+        if self._bar is not None:
+            self._bar.n = min(t - first, self._bar.total)
+            self._bar.set_postfix_str(text)
+            return
+        done = (t - first) / max(self.until - first, 1e-300)
+        left = (now - began) * (1.0 - done) / max(done, 1e-9)
+        log.info("%s, %.1f %% of %.4g s, %.0f s left", text, 100.0 * t / self.until, self.until, left)
+
+
+def energy_drift(simulation: Simulation) -> float:
+    """Energy that loads and conditions do not explain over the energy there is [-]; what is dissipated counts."""
+    energy = simulation.energy()
+    start = simulation.stepper.ledger.start
+    gained = energy["total"] - start - energy["external"] - energy["constraint"]
+    return gained / max(abs(energy["total"]), abs(start), 1e-300)

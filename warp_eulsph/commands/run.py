@@ -1,0 +1,32 @@
+"""``warp-eulsph run``: a case from its start."""
+
+import argparse
+from pathlib import Path
+
+from .options import STATUS, add_options
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Describe the subcommand."""
+    parser = commands.add_parser("run", help="run a case into a directory", description=f"Run a case. {STATUS}")
+    parser.add_argument("case", metavar="CASE", help="case.toml, case.py, or example:NAME")
+    parser.add_argument("-s", "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="directory of the run; default runs/NAME")
+    parser.add_argument("--replace", action="store_true", help="move a run that is there to DIR/abandoned")
+    add_options(parser)
+    parser.set_defaults(run_command=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run; the exit status."""
+    from .loading import load_case
+    from .session import BAD_INPUT, carry_out, complain, start_logging
+
+    start_logging()
+    try:
+        case = load_case(arguments.case, arguments.set, arguments.device)
+    except (ValueError, OSError) as error:
+        return complain(error, BAD_INPUT)
+    directory = arguments.output or Path("runs") / case.name
+    until = case.until if arguments.until is None else arguments.until
+    return carry_out(case, directory, until, arguments.max_wall, resume=False, force=False, replace=arguments.replace)

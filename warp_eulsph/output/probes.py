@@ -1,0 +1,206 @@
+"""Probes: figures of a run at a place, of a body, of a condition or across a plane, each to a table of its own."""
+
+import functools
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from ..boundaries import Boundary
+from ..diagnostics import BodySums, SectionForce
+from ..schedule import EverySteps, Schedule
+from ..simulation import Simulation
+from ..space import Space
+from ..weights import Weight
+from ..weights.base import value
+from .stress import body_stress
+
+#: Figures of the present state, by name; the same names and shapes every time.
+Measure = Callable[[], dict[str, Any]]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Probe(ABC):
+    """What is looked at, and when.
+
+    Args:
+        name: of the table: letters, digits, ``-``, ``_``.
+        schedule: when; every step by default.
+    """
+
+    name: str
+    schedule: Schedule = EverySteps(1)
+
+    #: SI units of the figures, by name.
+    units: ClassVar[dict[str, str]]
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[\w-]+", self.name):
+            raise ValueError(f"probe name must be of letters, digits, - and _, got {self.name!r}")
+
+    @abstractmethod
+    def bind(self, simulation: Simulation) -> Measure:
+        """What measures; called at the start of a run, before its first step, and when it is resumed.
+
+        Raises:
+            ValueError: what is looked at is not in the simulation.
+        """
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PointProbe(Probe):
+    """Position, velocity, deformation gradient and Cauchy stress of a material point.
+
+    Means over its neighbours with the simulation's weight, corrected to be exact for fields that are linear in the
+    initial position (Shepard's and Bonet's corrections together); near a surface they extrapolate.
+
+    Args:
+        X: initial position [m], (dim,).
+        body: name of its body; the first by default.
+    """
+
+    X: Sequence[float]
+    body: str | None = None
+    units: ClassVar[dict[str, str]] = {"x": "m", "v": "m/s", "F": "-", "cauchy_stress": "Pa"}
+
+    def bind(self, simulation: Simulation) -> Measure:
+        body = _body(self, simulation, self.body)
+        point = np.asarray(self.X, dtype=float)
+        if point.shape != (simulation.space.dim,) or not np.isfinite(point).all():
+            raise ValueError(f"probe {self.name!r}: X must be ({simulation.space.dim},) finite numbers, got {self.X}")
+        near, share = _shape_functions(simulation, body, point, self.name)
+        indices = wp.array(near + simulation.ranges[body.name].start, dtype=wp.int32, device=simulation.device)
+        U, real = simulation.stepper.U, simulation.space.real
+
+        def measure() -> dict[str, Any]:
+            x, v, F = (array[indices].numpy() for array in (U.x, U.v, U.F))
+            stress = body_stress(body.material, F, real, simulation.device)
+            fields = {"x": x, "v": v, "F": F, "cauchy_stress": stress}
+            return {name: np.tensordot(share, field.astype(float), 1) for name, field in fields.items()}
+
+        return measure
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BodyProbe(Probe):
+    """Centre of mass, momenta (angular about the origin) and kinetic energy of a body.
+
+    Args:
+        body: its name; the first by default.
+    """
+
+    body: str | None = None
+    units: ClassVar[dict[str, str]] = {
+        "centre": "m",
+        "momentum": "kg m/s",
+        "angular_momentum": "kg m^2/s",
+        "kinetic": "J",
+    }
+
+    def bind(self, simulation: Simulation) -> Measure:
+        particles = simulation.ranges[_body(self, simulation, self.body).name]
+        sums = BodySums(simulation.space, simulation.particles, particles, simulation.device)
+        return lambda: dict(sums(simulation.stepper.U))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReactionProbe(Probe):
+    """Force that a velocity condition exerts on its particles, mean over the step.
+
+    Args:
+        boundary: the condition, one of the simulation's.
+    """
+
+    boundary: Boundary
+    units: ClassVar[dict[str, str]] = {"force": "N"}
+
+    def bind(self, simulation: Simulation) -> Measure:
+        if self.boundary not in simulation.boundaries:
+            raise ValueError(
+                f"probe {self.name!r}: boundary must be one of the simulation's {len(simulation.boundaries)}, "
+                f"got {self.boundary!r}"
+            )
+        return lambda: {"force": simulation.reaction(self.boundary)}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SectionProbe(Probe):
+    """Force across a cut of the material: what the part in front of a plane exerts on the part behind it.
+
+    The cut moves with the material. What particles exert on each other is summed, so the force is that of the scheme,
+    exact in its balance of momentum; a correction by surface vectors (M10) is no force between particles and is in it.
+
+    Args:
+        point: a point of the plane in the initial configuration [m], (dim,).
+        normal: normal of the plane there, pointing to the front, (dim,).
+        body: name of the body that is cut; the first by default.
+    """
+
+    point: Sequence[float]
+    normal: Sequence[float]
+    body: str | None = None
+    units: ClassVar[dict[str, str]] = {"force": "N"}
+
+    def bind(self, simulation: Simulation) -> Measure:
+        body, dim = _body(self, simulation, self.body), simulation.space.dim
+        point, normal = (np.asarray(given, dtype=float) for given in (self.point, self.normal))
+        if point.shape != (dim,) or normal.shape != (dim,) or not np.linalg.norm(normal) > 0.0:
+            raise ValueError(
+                f"probe {self.name!r}: point and normal must be ({dim},) numbers, normal not zero, "
+                f"got {self.point} and {self.normal}"
+            )
+        behind = np.flatnonzero((body.x - point) @ normal < 0.0)
+        if behind.size in (0, len(body.x)):
+            raise ValueError(
+                f"probe {self.name!r}: the plane must cut body {body.name!r}, all of its particles lie on one side; "
+                f"they reach from {body.x.min(axis=0)} to {body.x.max(axis=0)} m"
+            )
+        force = SectionForce(simulation.space, behind + simulation.ranges[body.name].start, simulation.device)
+        return lambda: {"force": force(simulation.stepper.forces)}
+
+
+def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
+    if name is None:
+        return simulation.bodies[0]
+    for body in simulation.bodies:
+        if body.name == name:
+            return body
+    raise ValueError(f"probe {probe.name!r}: body must be one of {sorted(simulation.ranges)}, got {name!r}")
+
+
+@functools.cache
+def _make_weigh(weight: Weight, space: Space) -> Any:
+    """Kernel: W(r, h) of each distance."""
+    real, W_of = space.real, value(weight, space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def weigh(r: wp.array(dtype=real), h: wp.array(dtype=real), out: wp.array(dtype=real)):
+        i = wp.tid()
+        out[i] = W_of(r[i], h[i])
+
+    return weigh
+
+
+def _shape_functions(simulation: Simulation, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
+    space, weight, device = simulation.space, simulation.stepper.configuration.weight, simulation.device
+    h = np.broadcast_to(simulation.dilation * body.spacing, len(body.x))
+    away = body.x - X
+    r = np.linalg.norm(away, axis=1)
+    near = np.flatnonzero(r < weight.support * h)
+    distances, lengths = (wp.array(given[near], dtype=space.real, device=device) for given in (r, h))
+    W = wp.zeros(len(near), dtype=space.real, device=device)
+    wp.launch(_make_weigh(weight, space), len(near), [distances, lengths, W], device=device)
+    weights = np.asarray(W.numpy(), dtype=float) * np.broadcast_to(body.volume, len(body.x))[near]
+    basis = np.column_stack([np.ones(len(near)), away[near] / (h.max())])
+    moments = basis.T @ (weights[:, None] * basis)
+    if len(near) < 1 + space.dim or np.linalg.cond(moments) > 1e8:
+        raise ValueError(
+            f"probe {name!r}: X = {X.tolist()} m must lie in body {body.name!r}, {len(near)} of its particles are "
+            f"within reach; they lie in {body.x.min(axis=0)} to {body.x.max(axis=0)} m"
+        )
+    return near, weights * (basis @ np.linalg.inv(moments)[:, 0])

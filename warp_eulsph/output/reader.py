@@ -1,0 +1,259 @@
+"""A run read back: ``Run("runs/column")[-1].F``."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+
+from .directory import RunDirectory
+from .log import read_log
+from .manifest import Entry, Manifest
+from .snapshot import read_field, read_units
+from .tables import read_table
+
+#: Units of the fields that a frame derives from those it holds.
+DERIVED = {
+    "von_mises": "Pa",
+    "principal_stresses": "Pa",
+    "principal_stretches": "-",
+    "green_lagrange": "-",
+}
+
+
+class RunFrame:
+    """One snapshot; fields are read when they are asked for, and kept.
+
+    Attributes:
+        path: of the file. time: [s]. step: steps taken before it. N: number of particles.
+    """
+
+    def __init__(self, directory: Path, entry: Entry):
+        self.path = directory / entry.name
+        self.time, self.step, self.N = entry.time, entry.step, entry.particles
+        self._fields: dict[str, np.ndarray] = {}
+
+    def __repr__(self) -> str:
+        return f"<frame of step {self.step}, t = {self.time:.8g} s, {self.N} particles>"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A field of the file by its name, ``x`` the positions [m]: (N,), (N, dim) or (N, dim, dim).
+
+        Raises:
+            KeyError: the file has no such field.
+        """
+        if name not in self._fields:
+            self._fields[name] = read_field(self.path, name)
+        return self._fields[name]
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions [m], (N, dim)."""
+        return self["x"]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities [m/s], (N, dim)."""
+        return self["velocity"]
+
+    @property
+    def F(self) -> np.ndarray:
+        """Deformation gradients [-], (N, dim, dim)."""
+        return self["deformation_gradient"]
+
+    @property
+    def J(self) -> np.ndarray:
+        """Volume ratios det F [-], (N,)."""
+        return self["J"] if "J" in self.units else np.linalg.det(self.F)
+
+    @property
+    def cauchy_stress(self) -> np.ndarray:
+        """Cauchy stresses [Pa], (N, 3, 3)."""
+        return self["cauchy_stress"]
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Minus a third of the trace of the stress [Pa], (N,)."""
+        return self["pressure"] if "pressure" in self.units else -np.trace(self.cauchy_stress.T) / 3.0
+
+    @property
+    def von_mises(self) -> np.ndarray:
+        """Von Mises stress √(3/2 s:s) of the stress deviator s [Pa], (N,)."""
+        sigma = self.cauchy_stress.astype(float)
+        deviator = sigma - np.trace(sigma.T)[:, None, None] / 3.0 * np.eye(3)
+        return np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator))
+
+    @property
+    def principal_stresses(self) -> np.ndarray:
+        """Eigenvalues of the Cauchy stress [Pa], (N, 3), least first."""
+        return np.linalg.eigvalsh(self.cauchy_stress.astype(float))
+
+    @property
+    def principal_stretches(self) -> np.ndarray:
+        """Singular values of F [-], (N, dim), least first."""
+        return np.linalg.svd(self.F.astype(float), compute_uv=False)[:, ::-1]
+
+    @property
+    def green_lagrange(self) -> np.ndarray:
+        """Green-Lagrange strain ½ (FᵀF − I) [-], (N, dim, dim)."""
+        F = self.F.astype(float)
+        return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(F.shape[1]))
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """SI units of the fields in the file, by name."""
+        return {"x": "m", **read_units(self.path)}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How far two runs are apart at the times both have.
+
+    Attributes:
+        times: [s], (k,).
+        rms, largest: by field, root mean square over the particles and largest length of the difference, (k,) each.
+    """
+
+    times: np.ndarray
+    rms: dict[str, np.ndarray]
+    largest: dict[str, np.ndarray]
+
+
+class Run(Sequence[RunFrame]):
+    """The directory of a run, read lazily; it may still be running.
+
+    Args:
+        path: of the directory.
+
+    Raises:
+        FileNotFoundError: there is no run.
+    """
+
+    def __init__(self, path: str | PathLike):
+        self.directory = RunDirectory(path)
+        if not self.directory.holds_a_run:
+            raise FileNotFoundError(f"no run in {self.directory.path}: neither run.json nor snapshots are there")
+        manifest = Manifest(self.directory.path)
+        try:
+            manifest.read()
+        except ValueError:
+            manifest.examine()
+        if not manifest.entries:
+            manifest.examine()
+        self._entries = manifest.entries
+
+    def __repr__(self) -> str:
+        return f"<run in {self.directory.path}: {len(self)} frames>"
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __iter__(self) -> Iterator[RunFrame]:
+        return (self[k] for k in range(len(self)))
+
+    @overload
+    def __getitem__(self, index: int) -> RunFrame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[RunFrame]: ...
+
+    def __getitem__(self, index: int | slice) -> RunFrame | list[RunFrame]:
+        if isinstance(index, slice):
+            return [RunFrame(self.directory.path, entry) for entry in self._entries[index]]
+        return RunFrame(self.directory.path, self._entries[index])
+
+    def at(self, time: float) -> RunFrame:
+        """The frame nearest to ``time`` [s]."""
+        return self[int(np.abs(self.times - time).argmin())]
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the frames [s], (frames,)."""
+        return np.array([entry.time for entry in self._entries])
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Steps taken before the frames, (frames,)."""
+        return np.array([entry.step for entry in self._entries], dtype=int)
+
+    @property
+    def fields(self) -> list[str]:
+        """Names of the fields in the first snapshot, and of those derived from them."""
+        held = list(self[0].units) if len(self) else []
+        needs = {name: "cauchy_stress" if unit == "Pa" else "deformation_gradient" for name, unit in DERIVED.items()}
+        return held + [name for name, need in needs.items() if need in held]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI units of the fields, by name."""
+        held = self[0].units if len(self) else {}
+        return {name: held.get(name) or DERIVED[name] for name in self.fields}
+
+    @cached_property
+    def log(self) -> dict[str, np.ndarray]:
+        """Columns of the log: ``t`` [s], ``total`` and other energies [J], ``momentum`` [kg m/s] …, (lines, …) each."""
+        return read_log(self.directory.log)
+
+    @cached_property
+    def probes(self) -> dict[str, dict[str, np.ndarray]]:
+        """Columns of each probe's table, by its name."""
+        return {name: read_table(self.directory.probes / name)[0] for name in self.probe_names}
+
+    @property
+    def probe_names(self) -> list[str]:
+        """Names of the probes that have tables."""
+        return sorted(path.name for path in self.directory.probes.glob("*") if any(path.glob("*.h5")))
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What was run: ``simulation``, ``recording``, ``until`` [s], ``case``."""
+        return self.directory.read(self.directory.description)
+
+    @property
+    def environment(self) -> dict[str, Any]:
+        """Versions and device of each session of the run."""
+        return self.directory.read(self.directory.environment)
+
+    @property
+    def status(self) -> Mapping[str, Any]:
+        """How the run ended, or that it is running."""
+        return self.directory.read(self.directory.status)
+
+    @property
+    def state(self) -> str:
+        """``done``, ``stopped``, ``unstable``, ``failed``, ``running``, or ``killed``: it was running and is not."""
+        state = self.status.get("state", "unknown")
+        return "killed" if state == "running" and not self.directory.busy else state
+
+    def compare(self, other: "Run", fields: Sequence[str] = ("x",)) -> Comparison:
+        """Differences of the same particles in both runs, at the times that both have.
+
+        Raises:
+            ValueError: no common times, or different numbers of particles.
+        """
+        _, mine, theirs = np.intersect1d(self.times, other.times, return_indices=True)
+        if not len(mine):
+            raise ValueError(
+                f"the runs have no time in common: {self.times[:3]} ... and {other.times[:3]} ... s; write their "
+                "snapshots at the same times"
+            )
+        rms: dict[str, list[float]] = {name: [] for name in fields}
+        largest: dict[str, list[float]] = {name: [] for name in fields}
+        for i, j in zip(mine.tolist(), theirs.tolist(), strict=True):
+            first, second = self[i], other[j]
+            if first.N != second.N:
+                raise ValueError(f"the runs must have the same particles, got {first.N} and {second.N}")
+            for name in fields:
+                a, b = (_field(frame, name).astype(float).reshape(first.N, -1) for frame in (first, second))
+                apart = np.linalg.norm(a - b, axis=1)
+                rms[name].append(float(np.sqrt(np.mean(apart**2))))
+                largest[name].append(float(apart.max()))
+        as_arrays = [{name: np.array(values) for name, values in found.items()} for found in (rms, largest)]
+        return Comparison(self.times[mine], *as_arrays)
+
+
+def _field(frame: RunFrame, name: str) -> np.ndarray:
+    return getattr(frame, name) if name in DERIVED else frame[name]

@@ -1,0 +1,252 @@
+"""The run that is kept: steps, what is written on the way, and how it is taken up again."""
+
+import logging
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+from ..schedule import next_target
+from ..scheme.health import UnstableError
+from ..simulation import Simulation
+from .checkpoint import Checkpoint, Checkpoints, take
+from .description import describe, differences, plain
+from .directory import RunDirectory
+from .environment import environment
+from .log import append, cut, look
+from .recording import Recording
+from .series import SnapshotWriter
+from .snapshot import collect
+from .stopping import Stop
+from .tables import Table
+from .worker import Worker
+
+log = logging.getLogger(__name__)
+
+# Lines of the log and rows of tables wait in memory this long [s], and rows until there are so many.
+_PATIENCE, _ROWS = 1.0, 10_000
+
+
+class ChangedCaseError(ValueError):
+    """A run is to be resumed with another simulation or recording than it was begun with."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a call of ``record`` ended.
+
+    Attributes:
+        time: [s]. step: steps taken.
+        stopped: why it stopped before its end; None if it is done.
+    """
+
+    time: float
+    step: int
+    stopped: str | None = None
+
+
+def record(
+    simulation: Simulation,
+    directory: str | PathLike,
+    until: float,
+    recording: Recording = Recording(),
+    *,
+    resume: bool = False,
+    force: bool = False,
+    replace: bool = False,
+    case: Mapping[str, Any] | None = None,
+    stop: Stop | None = None,
+    watch: Callable[[Simulation], object] | None = None,
+) -> Outcome:
+    """Run to ``until`` [s], hit exactly, and keep in ``directory`` what ``recording`` asks for.
+
+    A resumed run takes bit by bit the steps that it would have taken without the interruption, on the same machine with
+    the same versions.
+
+    Args:
+        simulation: at its start, also to resume: it is put where the run was.
+        directory: of the run, made if absent.
+        until: end time [s].
+        recording: what is kept.
+        resume: go on from the last whole checkpoint; from the start if there is none yet.
+        force: resume although the case has changed.
+        replace: move a run that is there to ``abandoned/`` in the directory.
+        case: how the simulation was built, for ``run.json``.
+        stop: asked after each step whether to stop; None never stops.
+        watch: called after each step, to show progress.
+
+    Raises:
+        BusyError: another run writes into the directory.
+        FileExistsError: a run is there, and neither ``resume`` nor ``replace`` is set.
+        ChangedCaseError: the case has changed since the checkpoint; it names the changes.
+        DamagedError: no checkpoint is whole.
+        UnstableError: see ``Simulation.run``; the last checkpoint and snapshot stay.
+        OSError: the disk refused; all that was written before is whole, and the run can be resumed.
+        ValueError: ``until`` is before the present time.
+    """
+    home = RunDirectory(directory)
+    with home.locked():
+        checkpoint = Checkpoints(home.checkpoints).newest() if resume else None
+        present = simulation.t if checkpoint is None else checkpoint.time
+        if not (math.isfinite(until) and until >= present):
+            raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
+        if checkpoint is None:
+            _begin(home, simulation, replace=replace or resume)
+        else:
+            _go_on(home, simulation, recording, checkpoint, force=force)
+        kept = {"until": until, "case": dict(case or {}), **_description(simulation, recording)}
+        home.write(home.description, kept)
+        recorder = _Recorder(home, simulation, recording, resume=checkpoint is not None)
+        return recorder.run(until, stop, watch)
+
+
+def _begin(home: RunDirectory, simulation: Simulation, *, replace: bool) -> None:
+    """Make room for a new run."""
+    if home.holds_a_run and not replace:
+        raise FileExistsError(f"{home.path} holds a run; resume it, choose another directory, or replace it")
+    home.abandon()
+    home.write(home.environment, {"sessions": [environment(simulation)]})
+
+
+def _go_on(
+    home: RunDirectory, simulation: Simulation, recording: Recording, checkpoint: Checkpoint, *, force: bool
+) -> None:
+    """Put the simulation where the run was, and set aside what the run has of later steps."""
+    _compare(checkpoint, simulation, recording, force)
+    simulation.restore(checkpoint.arrays, checkpoint.counters)
+    home.rewind(checkpoint.step)
+    cut(home.log, checkpoint.step)
+    sessions = home.read(home.environment).get("sessions", [])
+    home.write(home.environment, {"sessions": [*sessions, environment(simulation)]})
+    log.info("resumed at step %d, t = %.8g s", checkpoint.step, checkpoint.time)
+
+
+def _description(simulation: Simulation, recording: Recording) -> dict[str, Any]:
+    kept = plain(recording)
+    del kept["checkpoint"]  # wall time, which changes no step
+    return {"simulation": describe(simulation), "recording": kept}
+
+
+def _compare(checkpoint: Checkpoint, simulation: Simulation, recording: Recording, force: bool) -> None:
+    """Raise, or with ``force`` warn, when the case has changed; warn when the machine has."""
+    changes = differences(checkpoint.description, _description(simulation, recording))
+    if changes and not force:
+        listed = "\n  ".join(changes)
+        raise ChangedCaseError(
+            f"the case has changed since the checkpoint of step {checkpoint.step}:\n  {listed}\n"
+            "undo the changes, run it in another directory, or force the resume"
+        )
+    for change in changes:
+        log.warning("resuming a changed case: %s", change)
+    for change in differences(checkpoint.environment, environment(simulation)):
+        log.warning("resuming elsewhere, so the bits may differ: %s", change)
+
+
+class _Recorder:
+    """Writes what is due, in the background."""
+
+    def __init__(self, home: RunDirectory, simulation: Simulation, recording: Recording, *, resume: bool):
+        self.home, self.simulation, self.recording, self.resumed = home, simulation, recording, resume
+        self.measures = [(probe, probe.bind(simulation)) for probe in recording.probes]
+        self.tables = {probe.name: Table(home.probes / probe.name, probe.units) for probe in recording.probes}
+        self.snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, resume=True)
+        self.snapshots.derive()
+        self.checkpoints = Checkpoints(home.checkpoints)
+        self.description, self.environment = _description(simulation, recording), environment(simulation)
+        self.lines: list[dict[str, Any]] = []
+        self.worker = Worker()
+        self.flushed = self.checked = time.monotonic()
+
+    @property
+    def last(self) -> Any:
+        """Path of the last snapshot, for the message of a run that fails."""
+        self.worker.drain()
+        return self.snapshots.last
+
+    def run(self, until: float, stop: Stop | None, watch: Callable[[Simulation], object] | None) -> Outcome:
+        simulation, before = self.simulation, self.simulation.output
+        simulation.output = self
+        self._note_status("running", until)
+        state, reason = "failed", None
+        try:
+            if not self.resumed:
+                self.keep(everything=True)
+                self.checkpoint()
+            while simulation.t < until and reason is None:
+                self._advance(until)
+                self.worker.check()
+                self.keep(everything=simulation.t >= until)
+                reason = stop.reason() if stop is not None else None
+                if watch is not None:
+                    watch(simulation)
+            self.checkpoint()
+            self.worker.drain()
+            self.worker.check()
+            self.snapshots.finish()
+            state = "done" if reason is None or simulation.t >= until else "stopped"
+        except UnstableError as error:
+            state, reason = "unstable", str(error)
+            raise
+        except BaseException as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            self.worker.close()
+            simulation.output = before
+            self._note_status(state, until, reason)
+        return Outcome(simulation.t, simulation.steps, reason if state == "stopped" else None)
+
+    def _advance(self, until: float) -> None:
+        schedule, simulation = self.recording.schedule, self.simulation
+        target = next_target(schedule, simulation.t, until)
+        simulation.advance(target, schedule.steps_left(simulation.steps))
+
+    def keep(self, everything: bool) -> None:
+        """Queue what is due now, or everything."""
+        simulation, recording = self.simulation, self.recording
+        t, step, now = simulation.t, simulation.steps, time.monotonic()
+        if everything or recording.snapshots.due(t, step):
+            frame = collect(simulation, self.snapshots.fields)
+            self.worker.submit(lambda: self.snapshots.commit(frame))
+        if everything or recording.log.due(t, step):
+            self.lines.append(look(simulation))
+        for probe, measure in self.measures:
+            if everything or probe.schedule.due(t, step):
+                self.tables[probe.name].add(step, t, measure())
+        if now - self.checked > recording.checkpoint:
+            self.checkpoint()
+        elif now - self.flushed > _PATIENCE:
+            self._flush_lines()
+            self._flush_tables(_ROWS)
+
+    def checkpoint(self) -> None:
+        """Queue all that waits, then a checkpoint: what it follows is on disk before it."""
+        self._flush_lines()
+        self._flush_tables(1)
+        taken = take(self.simulation, self.description, self.environment)
+        self.worker.submit(lambda: self.checkpoints.write(taken))
+        self.checked = time.monotonic()
+
+    def _flush_lines(self) -> None:
+        lines, self.lines, self.flushed = self.lines, [], time.monotonic()
+        if lines:
+            self.worker.submit(lambda: append(self.home.log, lines))
+
+    def _flush_tables(self, least: int) -> None:
+        for table in self.tables.values():
+            if len(table) >= least:
+                self._submit_rows(table)
+
+    def _submit_rows(self, table: Table) -> None:
+        columns = table.take()
+        self.worker.submit(lambda: table.write(columns))
+
+    def _note_status(self, state: str, until: float, reason: str | None = None) -> None:
+        simulation = self.simulation
+        content = {"state": state, "reason": reason, "until": until, "step": simulation.steps, "t": simulation.t}
+        try:
+            self.home.write(self.home.status, content)
+        except OSError as error:  # the run's own error matters more
+            log.warning("cannot write %s: %s", self.home.status, error)

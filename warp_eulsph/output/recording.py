@@ -1,0 +1,51 @@
+"""What a run keeps, as options."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
+from .probes import Probe
+from .snapshot import checked_precision, chosen_fields
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """What a run keeps, and when.
+
+    Args:
+        snapshots: when a snapshot is written besides the start and the end.
+        fields: names of ``FIELDS`` in them; all by default.
+        dtype: ``np.float32`` or ``np.float64`` of their reals.
+        log: when energies, momenta and extrema go to the log besides the start and the end.
+        probes: what goes to tables of its own.
+        checkpoint: wall time between checkpoints [s]; one is written at the start, at the end and at a stop, too.
+
+    Raises:
+        ValueError: unknown fields or dtype, probes of equal names, a wall time that is not positive.
+    """
+
+    snapshots: Schedule = AtTimes()
+    fields: Iterable[str] | None = None
+    dtype: Any = np.float32
+    log: Schedule = EverySteps(10)
+    probes: Sequence[Probe] = ()
+    checkpoint: float = 600.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fields", tuple(chosen_fields(self.fields)))
+        object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
+        object.__setattr__(self, "probes", tuple(self.probes))
+        names = [probe.name for probe in self.probes]
+        if len(set(names)) < len(names):
+            raise ValueError(f"names of probes must differ, got {names}")
+        if math.isnan(self.checkpoint) or self.checkpoint <= 0.0:
+            raise ValueError(f"checkpoint must be a positive wall time [s], got {self.checkpoint}; 600 is 10 minutes")
+
+    @property
+    def schedule(self) -> Schedule:
+        """When anything is due."""
+        return AnyOf([self.snapshots, self.log, *(probe.schedule for probe in self.probes)])

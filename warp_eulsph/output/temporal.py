@@ -1,0 +1,91 @@
+"""The index of a run: one temporal VTKHDF file of virtual datasets over all snapshots, with relative paths."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .atomic import replace_file
+from .manifest import Entry
+
+# Particles are vertices 0, 1, 2, ...: the longest list serves all steps, and none depends on another file being there.
+_KINDS = ("Vertices", "Lines", "Polygons", "Strips")
+
+
+def write_index(path: Path, entries: Sequence[Entry]) -> None:
+    """Write ``path``, an index of the snapshots ``entries`` beside it, for ParaView (5.12 or newer) and VTK (9.3).
+
+    Fields are those that all snapshots have. A snapshot that is lost later reads as not-a-number.
+
+    Args:
+        path: of the index, in the run's directory.
+        entries: one or more snapshots, in order.
+
+    Raises:
+        OSError: a snapshot is not there, or the disk refused; what ``path`` held before is still there.
+    """
+    replace_file(path, _encode(path.parent, entries))
+
+
+def _encode(directory: Path, entries: Sequence[Entry]) -> bytes:
+    import h5py
+
+    memory = io.BytesIO()
+    counts = np.array([entry.particles for entry in entries], dtype=np.int64)
+    firsts = np.cumsum([0, *counts[:-1]]).astype(np.int64)
+    with h5py.File(memory, "w", libver=("earliest", "v110")) as file, h5py.File(directory / entries[-1].name) as last:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array([2, 2], dtype=np.int64)
+        root.attrs["Type"] = np.bytes_("PolyData")
+        root["NumberOfPoints"] = counts
+        _write_cells(root, counts)
+        steps = root.create_group("Steps")
+        steps.attrs["NSteps"] = np.int64(len(entries))
+        steps["Values"] = np.array([entry.time for entry in entries])
+        steps["PartOffsets"] = np.arange(len(entries), dtype=np.int64)
+        steps["NumberOfParts"] = np.ones(len(entries), dtype=np.int64)
+        steps["PointOffsets"] = firsts
+        for name in ("CellOffsets", "ConnectivityIdOffsets"):
+            steps[name] = np.zeros((len(entries), len(_KINDS)), dtype=np.int64)
+        fields = root.create_group("FieldData")
+        fields["Step"] = np.array([entry.step for entry in entries], dtype=np.int64)
+        _write_offsets(steps, "FieldDataOffsets", ["Step"], np.arange(len(entries), dtype=np.int64))
+        _virtual(root, "Points", last["VTKHDF/Points"], entries, firsts)
+        data, source = root.create_group("PointData"), last["VTKHDF/PointData"]
+        for name in source:
+            _virtual(data, name, source[name], entries, firsts)
+        _write_offsets(steps, "PointDataOffsets", list(source), firsts)
+    return memory.getvalue()
+
+
+def _write_cells(root: Any, counts: np.ndarray) -> None:
+    steps, most = len(counts), int(counts.max())
+    for kind in _KINDS:
+        group, cells = root.create_group(kind), counts if kind == "Vertices" else np.zeros(steps, dtype=np.int64)
+        group["NumberOfCells"], group["NumberOfConnectivityIds"] = cells, cells
+        size = most if kind == "Vertices" else 0
+        for name, length in (("Connectivity", size), ("Offsets", size + 1)):
+            ids = np.arange(length, dtype=np.int64)
+            group.create_dataset(name, data=ids, compression="gzip" if length > 1 else None)
+
+
+def _write_offsets(steps: Any, group: str, names: Sequence[str], offsets: np.ndarray) -> None:
+    made = steps.create_group(group)
+    for name in names:
+        made[name] = offsets
+
+
+def _virtual(group: Any, name: str, source: Any, entries: Sequence[Entry], firsts: np.ndarray) -> None:
+    """Dataset ``name``: that of every snapshot, one after the other."""
+    import h5py
+
+    total = sum(entry.particles for entry in entries)
+    layout = h5py.VirtualLayout((total, *source.shape[1:]), source.dtype)
+    for entry, first in zip(entries, firsts, strict=True):
+        rows = (entry.particles, *source.shape[1:])
+        layout[first : first + entry.particles] = h5py.VirtualSource(entry.name, source.name, rows, source.dtype)
+    made = group.create_virtual_dataset(name, layout, fillvalue=np.nan if source.dtype.kind == "f" else -1)
+    for key, value in source.attrs.items():
+        made.attrs[key] = value

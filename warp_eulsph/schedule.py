@@ -1,0 +1,126 @@
+"""When a run does something: every so much time, every so many steps, at given times. Schedules keep no state."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+# Times closer than this share of an interval are one time: a step between them would be round-off.
+SAME = 1e-9
+
+
+class Schedule(ABC):
+    """When something is due, told from time and step alone, so that a resumed run goes on as if never stopped."""
+
+    @abstractmethod
+    def due(self, t: float, step: int) -> bool:
+        """Whether it is due at time ``t`` [s] after ``step`` steps."""
+
+    def next_time(self, t: float) -> float:
+        """The first time [s] after ``t`` that the run must hit exactly; inf if there is none."""
+        return math.inf
+
+    def steps_left(self, step: int) -> int | None:
+        """Steps from ``step`` to the next one that is due; None if steps do not count."""
+        return None
+
+
+@dataclass(frozen=True)
+class EveryTime(Schedule):
+    """At start + k · interval, hit exactly.
+
+    Args:
+        interval: [s].
+        start: [s].
+    """
+
+    interval: float
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.interval) and self.interval > 0.0):
+            raise ValueError(f"interval must be a positive time [s], got {self.interval}")
+        if not math.isfinite(self.start):
+            raise ValueError(f"start must be a finite time [s], got {self.start}")
+
+    def due(self, t: float, step: int) -> bool:
+        return abs(t - self._time(round((t - self.start) / self.interval))) <= SAME * self.interval
+
+    def next_time(self, t: float) -> float:
+        k = max(math.floor((t - self.start) / self.interval), 0)
+        while self._time(k) <= t + SAME * self.interval:
+            k += 1
+        return self._time(k)
+
+    def _time(self, k: int) -> float:
+        return self.start + self.interval * k
+
+
+@dataclass(frozen=True)
+class EverySteps(Schedule):
+    """After every ``count`` steps, and at the start."""
+
+    count: int
+
+    def __post_init__(self) -> None:
+        if self.count < 1:
+            raise ValueError(f"count of steps must be at least 1, got {self.count}")
+
+    def due(self, t: float, step: int) -> bool:
+        return step % self.count == 0
+
+    def steps_left(self, step: int) -> int | None:
+        return self.count - step % self.count
+
+
+@dataclass(frozen=True)
+class AtTimes(Schedule):
+    """At given times [s], hit exactly; none by default.
+
+    Args:
+        times: [s], increasing.
+    """
+
+    times: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        times = tuple(float(time) for time in self.times)
+        if not all(math.isfinite(time) for time in times) or list(times) != sorted(set(times)):
+            raise ValueError(f"times must be finite and increase [s], got {list(self.times)}")
+        object.__setattr__(self, "times", times)
+
+    def due(self, t: float, step: int) -> bool:
+        return t in self.times
+
+    def next_time(self, t: float) -> float:
+        return next((time for time in self.times if time > t), math.inf)
+
+
+@dataclass(frozen=True)
+class AnyOf(Schedule):
+    """When any of several schedules says so."""
+
+    schedules: Sequence[Schedule]
+
+    def due(self, t: float, step: int) -> bool:
+        return any(schedule.due(t, step) for schedule in self.schedules)
+
+    def next_time(self, t: float) -> float:
+        return min((schedule.next_time(t) for schedule in self.schedules), default=math.inf)
+
+    def steps_left(self, step: int) -> int | None:
+        left = [steps for schedule in self.schedules if (steps := schedule.steps_left(step)) is not None]
+        return min(left, default=None)
+
+
+def next_target(schedule: Schedule, t: float, until: float) -> float:
+    """The next time [s] to hit exactly, at most ``until``, which swallows a target a hair before it."""
+    target = schedule.next_time(t)
+    return target if target < until - SAME * (until - t) else until
+
+
+def targets(schedule: Schedule, t: float, until: float) -> Iterator[float]:
+    """The times [s] after ``t`` that ``schedule`` has up to ``until``, which is the last."""
+    while t < until:
+        t = next_target(schedule, t, until)
+        yield t
