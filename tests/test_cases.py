@@ -15,6 +15,7 @@ from warp_eulsph.cases import CaseError, json_schema, parse_case, read_case
 from warp_eulsph.cases.case import SHAPES
 from warp_eulsph.cases.options import concrete, writable
 from warp_eulsph.cases.reading import tomllib
+from warp_eulsph.output import Probe, Run, record
 from warp_eulsph.validation.cases import (
     bar,
     bending_column,
@@ -114,6 +115,7 @@ def test_all_classes_of_the_package_can_be_named():
     """By existing: nothing is listed in the room of cases. Mirror ghosts are written as planes of the body."""
     left_out = {cls.__name__ for cls in concrete(es.Boundary)} - {cls.__name__ for cls in writable(es.Boundary)}
     assert left_out == {"MirrorGhosts"}
+    assert len(writable(Probe)) == len(concrete(Probe)) >= 4
     for base in (es.Material, es.Weight, es.ReferencePolicy):
         assert writable(base) == concrete(base) and len(concrete(base)) >= 4
     schema = json.dumps(json_schema())
@@ -236,6 +238,32 @@ def test_motion_and_traction_and_mirror_from_a_file():
     simulation = parse_case(mirrored).build()
     # Two support radii, 4 · 1.3 · 0.25 m, hold all of the body.
     assert len(simulation.x) == 32 and type(simulation.boundaries[0]).__name__ == "MirrorGhosts"
+
+
+def test_recording_and_probes_from_a_file(tmp_path):
+    """What is kept, and a probe of every kind; each says what the simulation says."""
+    data = small(
+        until=0.004,
+        boundary=[{"kind": "Fixed", "region": "y < 0.25"}, {"kind": "Velocity", "region": "y > 0.75", "value": [1, 0]}],
+        probe=[
+            {"kind": "PointProbe", "name": "top", "X": [0.5, 1], "schedule": {"kind": "EveryTime", "interval": 1e-3}},
+            {"kind": "BodyProbe", "name": "all", "body": "a"},
+            {"kind": "ReactionProbe", "name": "pull", "boundary": 1},
+            {"kind": "SectionProbe", "name": "cut", "point": [0, 0.5], "normal": [0, 1]},
+        ],
+        output={"every": 2e-3, "at": [1e-3], "fields": ["velocity"], "log": {"kind": "EverySteps", "count": 2}},
+    )
+    case = parse_case(data)
+    assert parse_case(case.describe()).describe() == case.describe()
+    simulation = case.build()
+    record(simulation, tmp_path, case.until, case.recording(simulation), case=case.describe())
+    run = Run(tmp_path)
+    np.testing.assert_allclose(run.times, [0.0, 1e-3, 2e-3, 4e-3], rtol=1e-12)
+    assert set(run.fields) == {"x", "velocity"} and len(run.log["t"]) >= 3
+    np.testing.assert_allclose(run.probes["top"]["t"], np.arange(5) * 1e-3, rtol=1e-9)
+    np.testing.assert_array_equal(run.probes["pull"]["force"][-1], simulation.reaction(simulation.boundaries[1]))
+    np.testing.assert_allclose(run.probes["all"]["momentum"][-1], simulation.momentum(), rtol=1e-12)
+    assert set(run.probes) == {"top", "all", "pull", "cut"}
 
 
 def test_bodies_by_name_and_periodic_boxes():
@@ -383,6 +411,10 @@ def test_all_mistakes_of_a_file_are_named_at_once(tmp_path):
         ({"reference": "Evry"}, "reference: unknown kind 'Evry'; did you mean 'Every'?"),
         ({"reference": {"kind": "Every", "steps": 1.5}}, "reference.steps: input should be a valid integer, got 1.5"),
         ({"scheme": {"kind": "Lax", "limiter": "None"}}, "scheme.limiter: unknown key; known are ['kind', 'smoothing'"),
+        ({"probe": [{"kind": "ReactionProbe", "name": "a", "boundary": 0}]}, "probe.0.boundary: must be one of the 0"),
+        ({"probe": [{"kind": "BodyProbe", "name": "a b"}]}, "probe.0: probe name must be of letters, digits, - and _"),
+        ({"probe": [{"kind": "BodyProbe", "name": "a"}] * 2}, "probe.1.name: is taken by another, got 'a'"),
+        ({"output": {"at": [2, 1]}}, "output.at: times must be finite and increase"),
         ({"precision": "half"}, "precision: input should be 'double' or 'single', got 'half'"),
         ({"parameters": 3}, "parameters: input should be a valid dictionary, got 3"),
         ({"time_step": {"fixed": "-1"}}, "time_step: fixed time step must be positive and finite, got -1.0 s"),
