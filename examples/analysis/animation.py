@@ -12,7 +12,7 @@ from pathlib import Path
 import warp as wp
 
 from warp_eulsph.cases import read_case
-from warp_eulsph.output.frames import snapshot_files
+from warp_eulsph.output import Run
 from warp_eulsph.pictures import Picture, film
 
 
@@ -28,7 +28,7 @@ def main(argv: list[str] | None = None) -> Path:
     wp.config.log_level = wp.LOG_WARNING
     case = read_case(args.case, args.set)
     case.build().run(case.until, every=case.until / args.frames, output=args.output)
-    path = film(snapshot_files(args.output), args.output / "animation.gif", Picture(field=args.field, size=(700, 500)))
+    path = film(Run(args.output), args.output / "animation.gif", Picture(field=args.field, size=(700, 500)))
     print(path)
     return path
 

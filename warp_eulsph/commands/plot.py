@@ -1,9 +1,10 @@
 """``warp-eulsph plot``: a picture or a film of a run."""
 
 import argparse
-import sys
 
-ENDINGS = "a .png shows one snapshot, a .gif or, where ffmpeg is, an .mp4 all of them"
+from .frames import chosen, complain
+
+ENDINGS = "a .png shows one frame, a .gif or, where ffmpeg is, an .mp4 all of them"
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -13,7 +14,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         help="draw a run: PNG, animated GIF, MP4",
         description=f"Draw a run; {ENDINGS}. Exit status: 0 drawn, 2 wrong input or a library that is missing.",
     )
-    parser.add_argument("directory", metavar="RUN", help="directory of a run, or one snapshot")
+    parser.add_argument("directory", metavar="RUN", help="directory of a run")
     parser.add_argument("-o", "--output", default="picture.png", metavar="FILE", help=f"{ENDINGS}; default %(default)s")
     parser.add_argument(
         "-f",
@@ -35,33 +36,31 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw; 0, or 2 when it cannot be."""
-    from ..output import read_snapshot
-    from ..output.frames import chosen, snapshot_files
+    from ..output import Run
     from ..pictures import Picture, film, picture
     from ..pictures.cells import spacing
 
     try:
         single = arguments.output.endswith(".png")
-        every = snapshot_files(arguments.directory)
-        files = chosen(every, arguments.frames or ("-1" if single else ":"))
-        if single and len(files) > 1:
-            raise ValueError(f"a PNG shows one snapshot, frames {arguments.frames} are {len(files)}; choose a .gif")
+        found = Run(arguments.directory)
+        frames = chosen(len(found), arguments.frames or ("-1" if single else ":"))
+        if single and len(frames) > 1:
+            raise ValueError(f"a PNG shows one frame, --frames {arguments.frames} are {len(frames)}; choose a .gif")
         view = {} if arguments.view is None else {"view": arguments.view}
         options = Picture(
             field=arguments.field,
             size=arguments.size,
             colours=arguments.colours,
             limits=arguments.limits,
-            spacing=spacing(read_snapshot(every[0]).x),
+            spacing=spacing(found[0].x),
             **view,
         )
         if single:
-            path = picture(read_snapshot(files[0]), arguments.output, options)
+            path = picture(found[frames[0]], arguments.output, options)
         else:
-            path = film(files, arguments.output, options, fps=arguments.fps)
+            path = film(found, arguments.output, options, frames=frames, fps=arguments.fps)
     except (ValueError, OSError, ModuleNotFoundError) as error:
-        print(f"warp-eulsph plot: {error}", file=sys.stderr)
-        return 2
+        return complain(error)
     print(path)
     return 0
 

@@ -10,12 +10,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from .reader import RunFrame
 from .snapshot import read_snapshot
+from .temporal import write_layout
 
 AXES = "xyz"
 
 
-def export(files: Sequence[Path], target: str | PathLike, fields: Sequence[str] | None = None) -> Path:
+def export(frames: Sequence[RunFrame], target: str | PathLike, fields: Sequence[str] | None = None) -> Path:
     """Write ``target``, in the format that its ending says; the path of it. It appears whole or not at all.
 
     ``.vtkhdf``: one file with all times (ParaView 5.12, VTK 9.3). ``.xdmf``: a small file that refers to the snapshots,
@@ -23,9 +25,9 @@ def export(files: Sequence[Path], target: str | PathLike, fields: Sequence[str] 
     arrays ``time``, ``step``, ``x`` and the fields, the first axis the time.
 
     Args:
-        files: snapshots in order, of equal numbers of particles for ``.npz``.
+        frames: of a run, in order; of equal numbers of particles for ``.npz``.
         target: file to make or replace.
-        fields: names of fields; all that the first snapshot has if None.
+        fields: names of fields in the snapshots; all that the first one has if None.
 
     Raises:
         ValueError: unknown ending or field, or numbers of particles that change.
@@ -34,15 +36,15 @@ def export(files: Sequence[Path], target: str | PathLike, fields: Sequence[str] 
     path = Path(target)
     if path.suffix not in FORMATS:
         raise ValueError(f"{path}: the ending must be one of {', '.join(FORMATS)}, got {path.suffix!r}")
-    first = read_snapshot(files[0])
-    names = list(first.fields) if fields is None else list(fields)
-    unknown = [name for name in names if name not in first.fields]
+    held = [name for name in frames[0].units if name != "x"]
+    names = held if fields is None else list(fields)
+    unknown = [name for name in names if name not in held]
     if unknown:
-        raise ValueError(f"fields must be among {list(first.fields)}, got {unknown}")
+        raise ValueError(f"fields must be among {held}, got {unknown}")
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".tmp")
     try:
-        FORMATS[path.suffix](temporary, path, list(files), names)
+        FORMATS[path.suffix](temporary, path, [frame.path for frame in frames], names)
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
@@ -127,24 +129,19 @@ def _refer(parent: ElementTree.Element, dataset: Any, place: str) -> None:
 def _write_vtkhdf(temporary: Path, target: Path, files: list[Path], names: list[str]) -> None:
     import h5py
 
+    counts, times, steps = [], [], []
+    for path in files:
+        with h5py.File(path, "r") as file:
+            counts.append(len(file["VTKHDF/Points"]))
+            times.append(float(file.attrs["time"]))
+            steps.append(int(file.attrs["step"]))
     with h5py.File(temporary, "w", libver=("earliest", "v110")) as out:
-        root = out.create_group("VTKHDF")
-        root.attrs["Version"], root.attrs["Type"] = np.array([2, 2], dtype=np.int64), np.bytes_("PolyData")
-        data, firsts, times, numbers = root.create_group("PointData"), [0], [], []
+        root = write_layout(out, np.array(counts, dtype=np.int64), times, steps, names)
         for path in files:
             with h5py.File(path, "r") as file:
-                source = file["VTKHDF"]
-                for group, name in [(root, "Points"), *((data, name) for name in names)]:
-                    _append(group, name, source["Points"] if group is root else source["PointData"][name])
-                firsts.append(firsts[-1] + len(source["Points"]))
-                times.append(float(file.attrs["time"]))
-                numbers.append(int(file.attrs["step"]))
-        counts = np.diff(firsts).astype(np.int64)
-        root["NumberOfPoints"] = counts
-        _write_vertices(root, counts)
-        _write_steps(root, np.array(firsts[:-1], dtype=np.int64), times, names)
-        root["FieldData/Step"] = np.array(numbers, dtype=np.int64)
-        root["Steps/FieldDataOffsets/Step"] = np.arange(len(files), dtype=np.int64)
+                _append(root, "Points", file["VTKHDF/Points"])
+                for name in names:
+                    _append(root["PointData"], name, file["VTKHDF/PointData"][name])
 
 
 def _append(group: Any, name: str, source: Any) -> None:
@@ -158,29 +155,6 @@ def _append(group: Any, name: str, source: Any) -> None:
     rows = len(group[name])
     group[name].resize(rows + len(source), axis=0)
     group[name][rows:] = source[()]
-
-
-def _write_vertices(root: Any, counts: np.ndarray) -> None:
-    """A vertex per particle, numbered anew at each time: the longest list serves all of them."""
-    for kind in ("Vertices", "Lines", "Polygons", "Strips"):
-        group, vertices = root.create_group(kind), kind == "Vertices"
-        cells = counts if vertices else np.zeros_like(counts)
-        group["NumberOfCells"], group["NumberOfConnectivityIds"] = cells, cells
-        size = int(counts.max()) if vertices else 0
-        group["Connectivity"] = np.arange(size, dtype=np.int64)
-        group["Offsets"] = np.arange(size + 1, dtype=np.int64)
-
-
-def _write_steps(root: Any, firsts: np.ndarray, times: list[float], names: list[str]) -> None:
-    steps, count = root.create_group("Steps"), len(times)
-    steps.attrs["NSteps"] = np.int64(count)
-    steps["Values"] = np.array(times)
-    steps["PartOffsets"], steps["NumberOfParts"] = np.arange(count, dtype=np.int64), np.ones(count, dtype=np.int64)
-    steps["PointOffsets"] = firsts
-    for name in ("CellOffsets", "ConnectivityIdOffsets"):
-        steps[name] = np.zeros((count, 4), dtype=np.int64)
-    for name in names:
-        steps[f"PointDataOffsets/{name}"] = firsts
 
 
 Writer = Callable[[Path, Path, list[Path], list[str]], None]

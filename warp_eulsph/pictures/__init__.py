@@ -1,4 +1,4 @@
-"""Pictures and films of snapshots: matplotlib in 1-D and 2-D, PyVista in 3-D, both imported when something is drawn.
+"""Pictures and films of runs: matplotlib in 1-D and 2-D, PyVista in 3-D, both imported when something is drawn.
 
 Every particle is drawn as the cell that its deformation gradient made of its first one, so that pictures show matter
 rather than dots.

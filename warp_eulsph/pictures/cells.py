@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..output import Snapshot
+from ..output.reader import RunFrame
 
 SAMPLE = 100  # particles whose nearest neighbour is looked for
 
@@ -19,14 +19,14 @@ def spacing(x: np.ndarray) -> float:
     return float(np.median(found))
 
 
-def corners(snapshot: Snapshot, size: float) -> np.ndarray:
+def corners(frame: RunFrame, size: float) -> np.ndarray:
     """Corners of each particle's cell [m], (n, 2^dim, dim): x_a + F_a c with c those of a cube of edge ``size`` [m].
 
     Corner k has the bits of k as its places along the axes. Without a deformation gradient cells stay cubes.
     """
-    x = snapshot.x.astype(float)
+    x = frame.x.astype(float)
     dim = x.shape[1]
     unit = np.array([[(k >> i & 1) - 0.5 for i in range(dim)] for k in range(2**dim)])
-    F = snapshot.fields.get("deformation_gradient", np.eye(dim)[None])
+    F = frame.F if "deformation_gradient" in frame.units else np.eye(dim)[None]
     offsets = np.einsum("nij,kj->nki", F.astype(float), size * unit)
     return x[:, None, :] + offsets

@@ -1,4 +1,4 @@
-"""Snapshots to picture and film files."""
+"""Frames of a run to picture and film files."""
 
 import shutil
 import subprocess
@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..output import Snapshot, read_snapshot
+from ..output import Run
+from ..output.reader import RunFrame
 from .cells import spacing
 from .plane import draw_line, draw_plane
 from .quantity import quantity
@@ -28,7 +29,7 @@ class Picture:
         size: width and height in pixels, even numbers for films.
         colours: a colour map of matplotlib.
         limits: least and largest value of the colours; those shown if None.
-        spacing: edge of the cells at the start [m]; by default the spacing of the first snapshot that is drawn.
+        spacing: edge of the cells at the start [m]; by default the spacing of the first frame that is drawn.
         extent: lower and upper corner of what is seen [m], (2, dim); by default that of what is drawn.
         view: where a picture in 3-D is looked at from; y points up.
     """
@@ -50,8 +51,8 @@ class Picture:
             raise ValueError(f"view must be three finite numbers, not all zero, got {self.view}")
 
 
-def picture(snapshot: Snapshot, target: str | PathLike, options: Picture = Picture()) -> Path:
-    """Draw one snapshot to a PNG file; the path of it.
+def picture(frame: RunFrame, target: str | PathLike, options: Picture = Picture()) -> Path:
+    """Draw one frame to a PNG file; the path of it.
 
     Raises:
         ValueError: no such field, or an ending that is not .png.
@@ -60,16 +61,23 @@ def picture(snapshot: Snapshot, target: str | PathLike, options: Picture = Pictu
     path = Path(target)
     if path.suffix != ".png":
         raise ValueError(f"{path}: the ending of a picture must be .png, got {path.suffix!r}")
-    image = _draw(snapshot, _completed(options, [snapshot]))
+    image = _draw(frame, _completed(options, [frame]))
     path.parent.mkdir(parents=True, exist_ok=True)
     _pillow().fromarray(image).save(path)
     return path
 
 
-def film(files: Sequence[Path], target: str | PathLike, options: Picture = Picture(), *, fps: float = 10.0) -> Path:
-    """Draw snapshots to an animated GIF, or an MP4 where ffmpeg is; the path of it.
+def film(
+    run: Run,
+    target: str | PathLike,
+    options: Picture = Picture(),
+    *,
+    frames: Sequence[int] | None = None,
+    fps: float = 10.0,
+) -> Path:
+    """Draw frames of a run, all by default, to an animated GIF, or an MP4 where ffmpeg is; the path of it.
 
-    View and colours are the same throughout, those that fit all snapshots unless ``options`` say.
+    View and colours are the same throughout, those that fit all frames unless ``options`` say.
 
     Raises:
         ValueError: no such field, an ending that is not .gif or .mp4, frames per second that are not positive.
@@ -83,25 +91,26 @@ def film(files: Sequence[Path], target: str | PathLike, options: Picture = Pictu
         raise ValueError(f"frames per second must be positive and finite, got {fps}")
     if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise FileNotFoundError(f"{path}: an MP4 needs the program ffmpeg; install it, or choose a .gif")
-    chosen = _completed(options, (read_snapshot(file) for file in files))
-    images = (_draw(read_snapshot(file), chosen) for file in files)
+    which = range(len(run)) if frames is None else frames
+    # Each frame is opened anew: a frame keeps what was read from it.
+    chosen = _completed(options, (run[k] for k in which))
+    images = (_draw(run[k], chosen) for k in which)
     path.parent.mkdir(parents=True, exist_ok=True)
     (_save_gif if path.suffix == ".gif" else _save_mp4)(path, images, fps)
     return path
 
 
-def _draw(snapshot: Snapshot, options: Picture) -> np.ndarray:
-    dim = snapshot.x.shape[1]
-    return {1: draw_line, 2: draw_plane, 3: draw_volume}[dim](snapshot, options)
+def _draw(frame: RunFrame, options: Picture) -> np.ndarray:
+    return {1: draw_line, 2: draw_plane, 3: draw_volume}[frame.x.shape[1]](frame, options)
 
 
-def _completed(options: Picture, snapshots: Iterable[Snapshot]) -> Picture:
-    """The options with what they leave open taken from the snapshots."""
+def _completed(options: Picture, frames: Iterable[RunFrame]) -> Picture:
+    """The options with what they leave open taken from the frames."""
     edge, low, high, least, largest = options.spacing, None, None, np.inf, -np.inf
-    for snapshot in snapshots:
-        values = quantity(snapshot, options.field).values
+    for frame in frames:
+        values = quantity(frame, options.field).values
         least, largest = min(least, float(values.min())), max(largest, float(values.max()))
-        x = snapshot.x.astype(float)
+        x = frame.x.astype(float)
         if edge is None:
             edge = spacing(x)
         low = x.min(axis=0) if low is None else np.minimum(low, x.min(axis=0))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ..output import Snapshot
+from ..output.reader import RunFrame
 from .cells import corners
 from .quantity import quantity
 
@@ -28,14 +28,14 @@ def matplotlib_figure(size: tuple[float, float]) -> Any:
     return figure
 
 
-def draw_line(snapshot: Snapshot, options: Any) -> np.ndarray:
+def draw_line(frame: RunFrame, options: Any) -> np.ndarray:
     """A quantity over x, as an image (height, width, 3) of bytes."""
     figure = matplotlib_figure(options.size)
-    shown = quantity(snapshot, options.field)
-    order = np.argsort(snapshot.x[:, 0])
+    shown = quantity(frame, options.field)
+    order = np.argsort(frame.x[:, 0])
     axes = figure.add_subplot()
-    axes.plot(snapshot.x[order, 0], shown.values[order], ".-", lw=1, ms=4)
-    axes.set(xlabel="x [m]", ylabel=shown.label, title=_title(snapshot))
+    axes.plot(frame.x[order, 0], shown.values[order], ".-", lw=1, ms=4)
+    axes.set(xlabel="x [m]", ylabel=shown.label, title=_title(frame))
     if options.limits is not None:
         axes.set_ylim(*_widened(options.limits))
     if options.extent is not None:
@@ -44,14 +44,14 @@ def draw_line(snapshot: Snapshot, options: Any) -> np.ndarray:
     return _image(figure)
 
 
-def draw_plane(snapshot: Snapshot, options: Any) -> np.ndarray:
+def draw_plane(frame: RunFrame, options: Any) -> np.ndarray:
     """Cells coloured by a quantity, as an image (height, width, 3) of bytes."""
     figure = matplotlib_figure(options.size)
     from matplotlib.collections import PolyCollection
 
-    shown = quantity(snapshot, options.field)
+    shown = quantity(frame, options.field)
     axes = figure.add_subplot()
-    outlines: Any = corners(snapshot, options.spacing)[:, OUTLINE]
+    outlines: Any = corners(frame, options.spacing)[:, OUTLINE]
     cells = PolyCollection(outlines, array=shown.values, cmap=options.colours)
     cells.set(edgecolor="face", linewidth=0.2)
     if options.limits is not None:
@@ -59,14 +59,14 @@ def draw_plane(snapshot: Snapshot, options: Any) -> np.ndarray:
     axes.add_collection(cells)
     extent = options.extent
     axes.set(xlim=extent[:, 0], ylim=extent[:, 1], aspect="equal", xlabel="x [m]", ylabel="y [m]")
-    axes.set_title(_title(snapshot))
+    axes.set_title(_title(frame))
     bar = figure.colorbar(cells, label=shown.label)
     bar.formatter.set_powerlimits((-3, 4))
     return _image(figure)
 
 
-def _title(snapshot: Snapshot) -> str:
-    return f"t = {snapshot.time:.6g} s"
+def _title(frame: RunFrame) -> str:
+    return f"t = {frame.time:.6g} s"
 
 
 def _widened(limits: tuple[float, float]) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ..output import Snapshot
+from ..output.reader import RunFrame
 from .cells import corners
 from .quantity import quantity
 
@@ -13,7 +13,7 @@ SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4,
 UP = (0.0, 1.0, 0.0)  # as columns do
 
 
-def draw_volume(snapshot: Snapshot, options: Any) -> np.ndarray:
+def draw_volume(frame: RunFrame, options: Any) -> np.ndarray:
     """Cells coloured by a quantity, as an image (height, width, 3) of bytes.
 
     Raises:
@@ -27,8 +27,8 @@ def draw_volume(snapshot: Snapshot, options: Any) -> np.ndarray:
 
     # Without a screen VTK warns of it, then draws all the same.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-    shown = quantity(snapshot, options.field)
-    points = corners(snapshot, options.spacing)
+    shown = quantity(frame, options.field)
+    points = corners(frame, options.spacing)
     n = len(points)
     sides = np.empty((n, len(SIDES), 5), dtype=np.int64)
     sides[:, :, 0], sides[:, :, 1:] = 4, 8 * np.arange(n)[:, None, None] + SIDES
@@ -42,7 +42,7 @@ def draw_volume(snapshot: Snapshot, options: Any) -> np.ndarray:
         look = {"scalars": "colour", "cmap": options.colours, "clim": options.limits, "ambient": 0.3}
         plotter.add_mesh(cells, scalar_bar_args=bar, **look)
         plotter.add_axes(color="black")
-        plotter.add_text(f"{shown.label}\nt = {snapshot.time:.6g} s", color="black", font_size=10)
+        plotter.add_text(f"{shown.label}\nt = {frame.time:.6g} s", color="black", font_size=10)
         low, high = options.extent
         centre, reach = 0.5 * (low + high), float(np.linalg.norm(high - low))
         away = np.array(options.view) / np.linalg.norm(options.view)
