@@ -4,7 +4,7 @@ Every particle is drawn as the cell that its deformation gradient made of its fi
 rather than dots.
 """
 
-from .draw import Picture, film, picture
+from .draw import Picture, draw_frame, film, fitted, picture
 from .quantity import Quantity, quantity
 
-__all__ = ["Picture", "Quantity", "film", "picture", "quantity"]
+__all__ = ["Picture", "Quantity", "draw_frame", "film", "fitted", "picture", "quantity"]

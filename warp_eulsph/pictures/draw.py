@@ -61,7 +61,7 @@ def picture(frame: RunFrame, target: str | PathLike, options: Picture = Picture(
     path = Path(target)
     if path.suffix != ".png":
         raise ValueError(f"{path}: the ending of a picture must be .png, got {path.suffix!r}")
-    image = _draw(frame, _completed(options, [frame]))
+    image = draw_frame(frame, fitted(options, [frame]))
     path.parent.mkdir(parents=True, exist_ok=True)
     _pillow().fromarray(image).save(path)
     return path
@@ -93,19 +93,20 @@ def film(
         raise FileNotFoundError(f"{path}: an MP4 needs the program ffmpeg; install it, or choose a .gif")
     which = range(len(run)) if frames is None else frames
     # Each frame is opened anew: a frame keeps what was read from it.
-    chosen = _completed(options, (run[k] for k in which))
-    images = (_draw(run[k], chosen) for k in which)
+    chosen = fitted(options, (run[k] for k in which))
+    images = (draw_frame(run[k], chosen) for k in which)
     path.parent.mkdir(parents=True, exist_ok=True)
     (_save_gif if path.suffix == ".gif" else _save_mp4)(path, images, fps)
     return path
 
 
-def _draw(frame: RunFrame, options: Picture) -> np.ndarray:
+def draw_frame(frame: RunFrame, options: Picture) -> np.ndarray:
+    """A frame as an image (height, width, 3) of bytes; ``options`` are those of ``fitted``."""
     return {1: draw_line, 2: draw_plane, 3: draw_volume}[frame.x.shape[1]](frame, options)
 
 
-def _completed(options: Picture, frames: Iterable[RunFrame]) -> Picture:
-    """The options with what they leave open taken from the frames."""
+def fitted(options: Picture, frames: Iterable[RunFrame]) -> Picture:
+    """The options with what they leave open, limits and view, taken from the frames: what fits all of them."""
     edge, low, high, least, largest = options.spacing, None, None, np.inf, -np.inf
     for frame in frames:
         values = quantity(frame, options.field).values
