@@ -138,7 +138,10 @@ class Case(Table):
         bodies, ghosts = [], []
         weight, space = self.weight.make(), self.space
         for name, table in self.body.items():
-            body = table.build(name)
+            try:
+                body = table.build(name)
+            except MemoryError:
+                raise ValueError(f"body.{name}: its particles do not fit into memory; increase the spacing") from None
             for plane in table.mirror:
                 depth = plane.depth
                 if depth is None:
@@ -200,6 +203,8 @@ class Case(Table):
         wrong = []
         dim, where = self.dim, " and ".join(COORDINATES[: self.dim])
         for name, body in self.body.items():
+            if body.dim not in (1, 2, 3):
+                wrong.append(f"body.{name}.shape: points must have 1, 2 or 3 components, got {body.dim}")
             if body.dim != dim:
                 wrong.append(f"body.{name}: bodies must have the same dimension, got {body.dim} and {dim}")
         for path, value in self._formulas():
