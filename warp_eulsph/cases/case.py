@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, Literal
 
+import numpy as np
 import warp as wp
 from pydantic import Field, field_validator, model_validator
 
@@ -10,7 +11,8 @@ from .. import geometry
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..materials import Material
-from ..output import FIELDS
+from ..output import FIELDS, Probe, Recording
+from ..schedule import AnyOf, AtTimes, EverySteps, EveryTime, Schedule
 from ..scheme.lax import Lax
 from ..scheme.lax_wendroff import LaxWendroff
 from ..scheme.reference import ReferencePolicy
@@ -20,7 +22,7 @@ from ..simulation import Body, Simulation
 from ..space import Space
 from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, Zone, boundaries, choice, one_of
+from .options import Table, choice, one_of
 from .values import Formula, Number, PlaceFormula, Whole
 
 #: The shapes of ``geometry``: its functions.
@@ -76,7 +78,8 @@ class OutputTable(Table):
     at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
     fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
     precision: Precision = Field("single", description="of the stored numbers")
-    region: Zone | None = Field(None, description="only these particles")
+    log: choice(Schedule) = Field({"kind": "EverySteps", "count": 10}, validate_default=True)  # type: ignore[valid-type]
+    checkpoint: Number = Field(600.0, gt=0.0, description="wall time between checkpoints [s]")
 
     @field_validator("fields")
     @classmethod
@@ -85,6 +88,11 @@ class OutputTable(Table):
             if name not in FIELDS:
                 raise ValueError(f"unknown field {name!r}{nearest(name, FIELDS)}; known are {list(FIELDS)}")
         return fields
+
+    @field_validator("at")
+    @classmethod
+    def _in_order(cls, at: list[float]) -> list[float]:
+        return list(AtTimes(at).times)
 
 
 class Case(Table):
@@ -97,7 +105,7 @@ class Case(Table):
     until: Number = Field(gt=0.0, description="end time [s]")
     parameters: dict[str, Number] = Field({}, description="numbers that formulas may use by name, or formulas of those")
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
-    boundary: list[boundaries()] = Field([], description="conditions, imposed in this order")  # type: ignore
+    boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
@@ -106,7 +114,8 @@ class Case(Table):
     periodic: list[Number] | None = Field(None, description="lengths [m] of a periodic box at the origin; 0 is open")
     precision: Precision = Field("double", description="of the simulation")
     device: str | None = Field(None, description="Warp device such as cuda:0; Warp's default otherwise")
-    output: OutputTable = Field(default_factory=OutputTable.model_construct)
+    output: OutputTable = Field({}, validate_default=True)  # type: ignore[arg-type]
+    probe: list[choice(Probe)] = Field([], description="what goes to tables of its own; boundary counts from 0")  # type: ignore
 
     @property
     def dim(self) -> int:
@@ -129,7 +138,10 @@ class Case(Table):
         bodies, ghosts = [], []
         weight, space = self.weight.make(), self.space
         for name, table in self.body.items():
-            body = table.build(name)
+            try:
+                body = table.build(name)
+            except MemoryError:
+                raise ValueError(f"body.{name}: its particles do not fit into memory; increase the spacing") from None
             for plane in table.mirror:
                 depth = plane.depth
                 if depth is None:
@@ -153,6 +165,31 @@ class Case(Table):
             device=self.device,
         )
 
+    def recording(self, simulation: Simulation) -> Recording:
+        """What a run of this simulation keeps.
+
+        Raises:
+            ValueError: probes of equal names.
+        """
+        output = self.output
+        snapshots: list[Schedule] = [AtTimes(output.at)]
+        snapshots += [EveryTime(output.every)] if output.every is not None else []
+        snapshots += [EverySteps(output.steps)] if output.steps is not None else []
+        probes = []
+        for table in self.probe:
+            arguments = table.arguments()
+            if "boundary" in arguments:
+                arguments["boundary"] = simulation.boundaries[arguments["boundary"]]
+            probes.append(table.target(**arguments))
+        return Recording(
+            snapshots=AnyOf(snapshots),
+            fields=output.fields,
+            dtype=np.float64 if output.precision == "double" else np.float32,
+            log=output.log.make(),
+            probes=probes,
+            checkpoint=output.checkpoint,
+        )
+
     def describe(self) -> dict[str, Any]:
         """The full case with its defaults, formulas of parameters worked out; JSON and TOML can hold it.
 
@@ -166,6 +203,8 @@ class Case(Table):
         wrong = []
         dim, where = self.dim, " and ".join(COORDINATES[: self.dim])
         for name, body in self.body.items():
+            if body.dim not in (1, 2, 3):
+                wrong.append(f"body.{name}.shape: points must have 1, 2 or 3 components, got {body.dim}")
             if body.dim != dim:
                 wrong.append(f"body.{name}: bodies must have the same dimension, got {body.dim} and {dim}")
         for path, value in self._formulas():
@@ -176,12 +215,20 @@ class Case(Table):
             if len(value.parts) not in allowed:
                 counts = " or ".join(str(count) for count in sorted(allowed))
                 wrong.append(f"{path}: must have {counts} components in {dim}-D, got {len(value.parts)}")
-        for k, condition in enumerate(self.boundary):
-            if condition.body is not None and condition.body not in self.body:
-                hint = nearest(condition.body, self.body)
+        named = [(f"boundary.{k}", table) for k, table in enumerate(self.boundary)]
+        probes = [(f"probe.{k}", table) for k, table in enumerate(self.probe)]
+        for path, table in named + probes:
+            of = getattr(table, "body", None)
+            if of is not None and of not in self.body:
                 wrong.append(
-                    f"boundary.{k}.body: unknown body {condition.body!r}{hint}; bodies are {sorted(self.body)}"
+                    f"{path}.body: unknown body {of!r}{nearest(of, self.body)}; bodies are {sorted(self.body)}"
                 )
+        for path, table in probes:
+            count = len(self.boundary)
+            if hasattr(table, "boundary") and not 0 <= table.boundary < count:
+                wrong.append(f"{path}.boundary: must be one of the {count} conditions, from 0, got {table.boundary}")
+        names = [table.name for _, table in probes]
+        wrong += [f"probe.{k}.name: is taken by another, got {n!r}" for k, n in enumerate(names) if n in names[:k]]
         if wrong:
             raise ValueError("\n".join(wrong))
         return self
@@ -190,6 +237,5 @@ class Case(Table):
         """Path and value of every formula of place."""
         tables: dict[str, Table] = {f"body.{name}": body for name, body in self.body.items()}
         tables |= {f"boundary.{k}": condition for k, condition in enumerate(self.boundary)}
-        tables["output"] = self.output
         pairs = ((f"{path}.{name}", value) for path, table in tables.items() for name, value in table)
         return [(path, value) for path, value in pairs if isinstance(value, Formula)]

@@ -31,7 +31,6 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
-from ..boundaries import Boundary
 from ..geometry import Patch
 from ..scheme.balance import Balance
 from ..scheme.pair_areas import PairAreas
@@ -61,17 +60,16 @@ class Options(Table):
 
     def make(self, space: Any = None) -> Any:
         """The object, or what the function returns; ``space`` is needed where formulas of place and time occur."""
-        return self.target(**{name: _made(getattr(self, name), space, name) for name in self._arguments()})
+        return self.target(**self.arguments(space))
 
-    @classmethod
-    def _arguments(cls) -> list[str]:
-        return [name for name in cls.model_fields if name != "kind"]
+    def arguments(self, space: Any = None) -> dict[str, Any]:
+        """The arguments as the class or function takes them."""
+        return {name: _made(value, space, name) for name, value in self if name != "kind"}
 
     @model_validator(mode="after")
     def _check(self) -> "Options":
         """The class's own checks, so that their message stands beside all others; formulas come to them later."""
-        values = [getattr(self, name) for name in self._arguments()]
-        if isinstance(self.target, type) and not any(isinstance(value, Formula) for value in values):
+        if isinstance(self.target, type) and not any(isinstance(value, Formula) for _, value in self):
             self.make()
         return self
 
@@ -141,11 +139,13 @@ def _written(name: str, hint: Any) -> Any:
         return PlaceTimeFormula
     if name == "correction":
         return choice(Balance, SurfaceVectors, PairAreas, optional=True)
+    if name == "boundary":
+        return Whole  # which of the case's conditions, from 0
     plain = {float: Number, int: Whole, bool: bool, str: str}
     if hint in plain:
         return plain[hint]
     origin, members = typing.get_origin(hint), typing.get_args(hint)
-    if origin is Sequence or origin is typing.get_origin(Sequence[int]):
+    if origin is typing.get_origin(Sequence[int]) and members[0] in plain:
         return list[plain[members[0]]]  # type: ignore[valid-type]
     if origin in (Union, types.UnionType):
         if PathLike in members:
@@ -166,7 +166,7 @@ def _written(name: str, hint: Any) -> Any:
 @functools.cache
 def choice(*bases: type, optional: bool = False) -> Any:
     """One of the concrete classes below ``bases``: a table with a kind, or the bare name where all has defaults."""
-    targets = [target for base in bases for target in concrete(base)]
+    targets = [target for base in bases for target in writable(base)]
     return one_of(*targets, optional=optional)
 
 
@@ -254,8 +254,3 @@ Zone = Annotated[
     Annotated[ZoneFormula, Tag("formula")] | Annotated[table_of(Patch, sole=True), Tag("patch")],  # type: ignore
     Discriminator(_zone_kind),
 ]
-
-
-def boundaries() -> Any:
-    """One of the boundary conditions."""
-    return one_of(*writable(Boundary))

@@ -11,10 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
 from ..output import Recording
-from ..schedule import AnyOf, AtTimes, EverySteps, EveryTime
 from ..simulation import Simulation
 
 EXAMPLE = "example:"
@@ -91,16 +88,7 @@ def _load_toml(path: Path, overrides: Sequence[str], device: str | None) -> tupl
     from ..cases import read_case
 
     case = read_case(path, [*overrides, *([f"device={device}"] if device else [])])
-    return case.build, case.until, lambda simulation: recording_of(case.output), case.describe()
-
-
-def recording_of(output: Any) -> Recording:
-    """What the table ``output`` of a case file asks for."""
-    schedules: list[Any] = [AtTimes(output.at)]
-    schedules += [EveryTime(output.every)] if output.every is not None else []
-    schedules += [EverySteps(output.steps)] if output.steps is not None else []
-    dtype = np.float64 if output.precision == "double" else np.float32
-    return Recording(snapshots=AnyOf(schedules), fields=output.fields, dtype=dtype)
+    return case.build, case.until, case.recording, case.describe()
 
 
 def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:

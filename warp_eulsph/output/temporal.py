@@ -36,28 +36,42 @@ def _encode(directory: Path, entries: Sequence[Entry]) -> bytes:
     counts = np.array([entry.particles for entry in entries], dtype=np.int64)
     firsts = np.cumsum([0, *counts[:-1]]).astype(np.int64)
     with h5py.File(memory, "w", libver=("earliest", "v110")) as file, h5py.File(directory / entries[-1].name) as last:
-        root = file.create_group("VTKHDF")
-        root.attrs["Version"] = np.array([2, 2], dtype=np.int64)
-        root.attrs["Type"] = np.bytes_("PolyData")
-        root["NumberOfPoints"] = counts
-        _write_cells(root, counts)
-        steps = root.create_group("Steps")
-        steps.attrs["NSteps"] = np.int64(len(entries))
-        steps["Values"] = np.array([entry.time for entry in entries])
-        steps["PartOffsets"] = np.arange(len(entries), dtype=np.int64)
-        steps["NumberOfParts"] = np.ones(len(entries), dtype=np.int64)
-        steps["PointOffsets"] = firsts
-        for name in ("CellOffsets", "ConnectivityIdOffsets"):
-            steps[name] = np.zeros((len(entries), len(_KINDS)), dtype=np.int64)
-        fields = root.create_group("FieldData")
-        fields["Step"] = np.array([entry.step for entry in entries], dtype=np.int64)
-        _write_offsets(steps, "FieldDataOffsets", ["Step"], np.arange(len(entries), dtype=np.int64))
+        source = last["VTKHDF/PointData"]
+        times, steps = [entry.time for entry in entries], [entry.step for entry in entries]
+        root = write_layout(file, counts, times, steps, list(source))
         _virtual(root, "Points", last["VTKHDF/Points"], entries, firsts)
-        data, source = root.create_group("PointData"), last["VTKHDF/PointData"]
         for name in source:
-            _virtual(data, name, source[name], entries, firsts)
-        _write_offsets(steps, "PointDataOffsets", list(source), firsts)
+            _virtual(root["PointData"], name, source[name], entries, firsts)
     return memory.getvalue()
+
+
+def write_layout(file: Any, counts: np.ndarray, times: Sequence[float], steps: Sequence[int], names: list[str]) -> Any:
+    """All of a temporal file but ``Points`` and the arrays ``names`` in ``PointData``; the group ``VTKHDF``.
+
+    Args:
+        file: open HDF5 file.
+        counts: numbers of particles, times [s], steps: one per frame.
+        names: fields, whose rows follow each other frame by frame.
+    """
+    frames, firsts = len(counts), np.cumsum([0, *counts[:-1]]).astype(np.int64)
+    root = file.create_group("VTKHDF")
+    root.attrs["Version"] = np.array([2, 2], dtype=np.int64)
+    root.attrs["Type"] = np.bytes_("PolyData")
+    root["NumberOfPoints"] = counts
+    _write_cells(root, counts)
+    table = root.create_group("Steps")
+    table.attrs["NSteps"] = np.int64(frames)
+    table["Values"] = np.array(times)
+    table["PartOffsets"] = np.arange(frames, dtype=np.int64)
+    table["NumberOfParts"] = np.ones(frames, dtype=np.int64)
+    table["PointOffsets"] = firsts
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        table[name] = np.zeros((frames, len(_KINDS)), dtype=np.int64)
+    root.create_group("FieldData")["Step"] = np.array(steps, dtype=np.int64)
+    _write_offsets(table, "FieldDataOffsets", ["Step"], np.arange(frames, dtype=np.int64))
+    root.create_group("PointData")
+    _write_offsets(table, "PointDataOffsets", names, firsts)
+    return root
 
 
 def _write_cells(root: Any, counts: np.ndarray) -> None:

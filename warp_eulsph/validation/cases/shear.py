@@ -65,7 +65,7 @@ def errors(simulation: Simulation, upper: Motion) -> dict[str, float]:
     }
 
 
-#: Name -> reference and scheme: default, with shifting, closed pair areas without a bound on energy, total Lagrangian.
+#: Name -> reference and scheme: default, shifted, closed pair areas without a bound on energy, total Lagrangian.
 FORMS = {
     "eulerian": (Always(), Verlet()),
     "eulerian_shifted": (Always(), Verlet(shifting=Shifting())),

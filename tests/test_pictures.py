@@ -1,0 +1,303 @@
+"""Pictures, films and exports of a run: the files say what the snapshots hold."""
+
+import csv
+import itertools
+import shutil
+import sys
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from warp_eulsph.cases import read_case
+from warp_eulsph.cli import main
+from warp_eulsph.commands.frames import chosen
+from warp_eulsph.output import Run, record
+from warp_eulsph.output.export import export
+from warp_eulsph.pictures import Picture, film, picture, quantity
+from warp_eulsph.pictures.cells import corners, spacing
+
+CASES = Path(__file__).parents[1] / "examples" / "cases"
+NAMES = {1: "bar", 2: "spinning_plate", 3: "twisting_column"}
+
+
+@pytest.fixture(scope="module", params=[1, 2, 3], ids=["1d", "2d", "3d"])
+def run(request, tmp_path_factory):
+    """A short run of four frames in 1-D, 2-D or 3-D."""
+    directory = tmp_path_factory.mktemp(f"run{request.param}")
+    case = read_case(CASES / f"{NAMES[request.param]}.toml", ["parameters.n=6"])
+    case = case.model_copy(update={"output": case.output.model_copy(update={"every": 0.1 * case.until})})
+    simulation = case.build()
+    record(simulation, directory, 0.3 * case.until, case.recording(simulation))
+    return Run(directory)
+
+
+def image(path):
+    from PIL import Image
+
+    return np.asarray(Image.open(path).convert("RGB"))
+
+
+# what is drawn
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("-1", [3]), ("0,2", [0, 2]), ("::2", [0, 2]), (":", [0, 1, 2, 3]), ("-2:", [2, 3]), ("3,:2", [3, 0, 1])],
+)
+def test_frames_are_chosen_as_in_python(text, expected):
+    assert chosen(4, text) == expected
+
+
+@pytest.mark.parametrize("text", ["9", "x", "", "1:2:3:4", "5:", "::0"])
+def test_frames_that_are_not_there_are_named(text):
+    with pytest.raises(ValueError, match=r"frames .*4"):
+        chosen(4, text)
+
+
+def test_quantities_by_name(run):
+    snapshot = run[-1]
+    v, sigma = snapshot.v.astype(float), snapshot.cauchy_stress.astype(float)
+    np.testing.assert_allclose(quantity(snapshot, "velocity").values, np.linalg.norm(v, axis=1))
+    assert quantity(snapshot, "velocity").label == "|velocity| [m/s]"
+    np.testing.assert_array_equal(quantity(snapshot, "velocity.x").values, v[:, 0])
+    np.testing.assert_array_equal(quantity(snapshot, "cauchy_stress.xz").values, sigma[:, 0, 2])
+    np.testing.assert_array_equal(quantity(snapshot, "J").values, snapshot.J)
+    mises = np.sqrt(
+        0.5 * ((sigma[:, 0, 0] - sigma[:, 1, 1]) ** 2 + (sigma[:, 1, 1] - sigma[:, 2, 2]) ** 2)
+        + 0.5 * (sigma[:, 2, 2] - sigma[:, 0, 0]) ** 2
+        + 3.0 * (sigma[:, 0, 1] ** 2 + sigma[:, 1, 2] ** 2 + sigma[:, 0, 2] ** 2)
+    )
+    np.testing.assert_allclose(quantity(snapshot, "von_mises").values, mises, rtol=1e-6, atol=1e-6 * mises.max())
+    assert quantity(snapshot, "von_mises").label == "von Mises stress [Pa]"
+    for name in ("velocty", "velocity.q", "velocity.xx", "J.x", "cauchy_stress.x", ""):
+        with pytest.raises(ValueError, match="got "):
+            quantity(snapshot, name)
+
+
+def test_cells_are_those_of_the_deformation():
+    """Corners of a sheared cell, and cells of a lattice that tile it."""
+    from warp_eulsph.geometry import box
+
+    class Sheared:
+        units: ClassVar = {"deformation_gradient": "-"}
+
+    x, volume = box((0.0, 0.0), (1.0, 2.0), 0.25)
+    F = np.array([[1.0, 0.5], [0.0, 1.0]])
+    snapshot = Sheared()
+    snapshot.x, snapshot.F = x @ F.T, np.tile(F, (len(x), 1, 1))
+    assert spacing(x) == pytest.approx(0.25)
+    cells = corners(snapshot, 0.25)
+    np.testing.assert_allclose(cells.min(axis=(0, 1)), [0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(cells.max(axis=(0, 1)), [2.0, 2.0])
+    areas = np.cross(
+        np.pad(cells[:, 1] - cells[:, 0], ((0, 0), (0, 1))), np.pad(cells[:, 2] - cells[:, 0], ((0, 0), (0, 1)))
+    )
+    np.testing.assert_allclose(areas[:, 2], volume)
+
+
+def test_picture_shows_the_values(run, tmp_path):
+    path = picture(run[-1], tmp_path / "new" / "a.png", Picture(field="velocity", size=(400, 300)))
+    first = image(path)
+    assert first.shape == (300, 400, 3) and first.std() > 10.0
+    other = picture(run[-1], tmp_path / "b.png", Picture(field="velocity.x", size=(400, 300)))
+    assert (image(other) != first).any()
+    again = picture(run[-1], tmp_path / "c.png", Picture(field="velocity", size=(400, 300)))
+    np.testing.assert_array_equal(image(again), first)
+
+
+def test_film_shows_every_snapshot(run, tmp_path):
+    from PIL import Image
+
+    path = film(run, tmp_path / "a.gif", Picture(size=(300, 200)), fps=5.0)
+    with Image.open(path) as shown:
+        assert shown.n_frames == 4 and shown.size == (300, 200)
+        assert shown.info["duration"] == 200
+        frames = []
+        for k in range(4):
+            shown.seek(k)
+            frames.append(np.asarray(shown.convert("RGB")).astype(int))
+    assert all((a != b).any() for a, b in itertools.pairwise(frames))
+
+
+def test_film_as_mp4_needs_ffmpeg(run, tmp_path, monkeypatch):
+    if shutil.which("ffmpeg"):
+        path = film(run, tmp_path / "a.mp4", Picture(size=(301, 201)))
+        assert path.read_bytes()[4:8] == b"ftyp"
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(FileNotFoundError, match="needs the program ffmpeg"):
+        film(run, tmp_path / "b.mp4")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"size": (10, 300)}, "size must be 100 to 10000 pixels"),
+        ({"limits": (1.0, 1.0)}, "limits must be a least and a larger value"),
+        ({"view": (0.0, 0.0, 0.0)}, "view must be three finite numbers, not all zero"),
+    ],
+)
+def test_options_of_pictures_are_checked(options, message):
+    with pytest.raises(ValueError, match=message):
+        Picture(**options)
+
+
+def test_missing_libraries_are_named(run, tmp_path, monkeypatch):
+    snapshot = run[0]
+    missing = {1: "matplotlib.figure", 2: "matplotlib.figure", 3: "pyvista"}[snapshot.x.shape[1]]
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'warp_eulsph\[viz\]'"):
+        picture(snapshot, tmp_path / "a.png")
+
+
+# exports
+
+
+def test_npz_holds_all_times(run, tmp_path):
+    data = np.load(export(list(run), tmp_path / "a.npz"))
+    for k, file in enumerate(run):
+        snapshot = file
+        assert (data["time"][k], data["step"][k]) == (snapshot.time, snapshot.step)
+        np.testing.assert_array_equal(data["x"][k], snapshot.x)
+        for name, values in [(name, snapshot[name]) for name in snapshot.units]:
+            np.testing.assert_array_equal(data[name][k], values)
+
+
+def test_csv_reads_back_to_the_same_numbers(run, tmp_path):
+    path = export(list(run), tmp_path / "a.csv", ["velocity", "deformation_gradient", "body"])
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    snapshot = run[-1]
+    n, dim = snapshot.x.shape
+    assert len(rows) == len(run) * n and float(rows[-1]["time"]) == snapshot.time
+    last = rows[-n:]
+    for i, axis in enumerate("xyz"[:dim]):
+        np.testing.assert_array_equal(np.array([row[axis] for row in last], dtype=np.float32), snapshot.x[:, i])
+        found = np.array([row[f"velocity_{axis}"] for row in last], dtype=np.float32)
+        np.testing.assert_array_equal(found, snapshot["velocity"][:, i])
+        found = np.array([row[f"deformation_gradient_x{axis}"] for row in last], dtype=np.float32)
+        np.testing.assert_array_equal(found, snapshot.F[:, 0, i])
+    assert [row["particle"] for row in last[:3]] == ["0", "1", "2"] and last[0]["body"] == "0"
+
+
+def test_single_vtkhdf_in_vtk(run, tmp_path):
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    path = export(list(run), tmp_path / "a.vtkhdf", ["velocity", "cauchy_stress", "body"])
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == 4
+    for k, file in enumerate(run):
+        snapshot = file
+        reader.SetStep(k)
+        reader.Update()
+        data = reader.GetOutput()
+        assert reader.GetTimeValue() == snapshot.time
+        dim = snapshot.x.shape[1]
+        assert data.GetNumberOfPoints() == data.GetNumberOfVerts() == len(snapshot.x)
+        np.testing.assert_array_equal(vtk_to_numpy(data.GetPoints().GetData())[:, :dim], snapshot.x)
+        velocity = vtk_to_numpy(data.GetPointData().GetArray("velocity"))
+        np.testing.assert_array_equal(velocity[:, :dim], snapshot["velocity"])
+        stress = vtk_to_numpy(data.GetPointData().GetArray("cauchy_stress"))
+        np.testing.assert_array_equal(stress, snapshot["cauchy_stress"].reshape(-1, 9))
+        assert data.GetFieldData().GetArray("Step").GetValue(0) == snapshot.step
+
+
+def test_xdmf_in_vtk(run):
+    """The small file beside the snapshots holds no numbers of its own but the times."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+    path = export(list(run), run.directory.path / "views" / "a.xdmf", ["velocity", "J", "cauchy_stress"])
+    assert path.stat().st_size < 10_000
+    reader = vtkXdmfReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+    assert list(times) == [file.time for file in run]
+    for time, file in zip(times, run, strict=True):
+        snapshot = file
+        reader.UpdateTimeStep(time)
+        data = reader.GetOutputDataObject(0)
+        dim = snapshot.x.shape[1]
+        np.testing.assert_array_equal(vtk_to_numpy(data.GetPoints().GetData())[:, :dim], snapshot.x)
+        for name, shown in (("velocity", (3,)), ("J", ()), ("cauchy_stress", (9,))):
+            values = vtk_to_numpy(data.GetPointData().GetArray(name))
+            assert values.shape == (len(snapshot.x), *shown)
+            expected = snapshot[name].reshape(len(values), -1)
+            np.testing.assert_array_equal(values.reshape(len(values), -1)[:, : expected.shape[1]], expected)
+
+
+def test_bad_exports_are_named(run, tmp_path):
+    with pytest.raises(ValueError, match=r"ending must be one of .vtkhdf, .xdmf, .csv, .npz, got '.txt'"):
+        export(list(run), tmp_path / "a.txt")
+    with pytest.raises(ValueError, match=r"fields must be among \['J'.*got \['speed'\]"):
+        export(list(run), tmp_path / "a.npz", ["speed"])
+    assert not list(tmp_path.iterdir())
+
+
+# the commands
+
+
+def test_commands_draw_and_export(run, tmp_path, capsys):
+    small = ["--size", "300,200"]
+    assert main(["plot", str(run.directory.path), "-o", str(tmp_path / "a.png"), "-f", "J", *small]) == 0
+    assert (
+        main(
+            ["plot", str(run.directory.path), "-o", str(tmp_path / "a.gif"), "--frames", "::3", "--limits=-1,1", *small]
+        )
+        == 0
+    )
+    assert (
+        main(["plot", str(run.directory.path), "-o", str(tmp_path / "b.png"), "--view=1,0,0", "--frames", "0", *small])
+        == 0
+    )
+    assert (
+        main(["export", str(run.directory.path), str(tmp_path / "a.npz"), "-f", "velocity,J", "--frames", "1:3"]) == 0
+    )
+    assert set(np.load(tmp_path / "a.npz")) == {"time", "step", "x", "velocity", "J"}
+    assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in ("a.png", "a.gif", "b.png", "a.npz")]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["plot", "nowhere"], "no run in nowhere"),
+        (["plot", "RUN", "-f", "speed"], "a picture must be coloured by one of"),
+        (["plot", "RUN", "-o", "a.jpg"], "the ending of a film must be one of .gif, .mp4"),
+        (["plot", "RUN", "--frames", ":"], "a PNG shows one frame, --frames : are 4"),
+        (["plot", "RUN", "-o", "a.gif", "--fps", "0"], "frames per second must be positive"),
+        (["export", "RUN", "a.txt"], "a.txt: the ending must be one of"),
+        (["export", "RUN", "a.npz", "--frames", "7"], "frames must be such as"),
+    ],
+)
+def test_bad_commands_exit_2_with_one_line(run, arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([str(run.directory.path) if word == "RUN" else word for word in arguments]) == 2
+    shown = capsys.readouterr().err
+    assert message in shown and "Traceback" not in shown
+    assert not [path for path in tmp_path.iterdir() if path.suffix in (".png", ".gif", ".npz")]
+
+
+def test_unknown_colours_are_named(run, capsys, tmp_path):
+    dim = run[0].x.shape[1]
+    status = main(["plot", str(run.directory.path), "--colours", "nocolour", "-o", str(tmp_path / "a.png")])
+    # A line needs no colours.
+    assert (status, "nocolour" in capsys.readouterr().err) == ((0, False) if dim == 1 else (2, True))
+
+
+def test_malformed_options_exit_2(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["plot", "x", "--limits", "1"])
+    assert ended.value.code == 2 and "must be 2 numbers with commas" in capsys.readouterr().err
+
+
+def test_schema_command_prints_the_schema(capsys):
+    import json
+
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["properties"]["until"]["description"] == "end time [s]"

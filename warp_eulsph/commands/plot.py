@@ -1,0 +1,78 @@
+"""``warp-eulsph plot``: a picture or a film of a run."""
+
+import argparse
+
+from .frames import chosen, complain
+
+ENDINGS = "a .png shows one frame, a .gif or, where ffmpeg is, an .mp4 all of them"
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Describe the subcommand."""
+    parser = commands.add_parser(
+        "plot",
+        help="draw a run: PNG, animated GIF, MP4",
+        description=f"Draw a run; {ENDINGS}. Exit status: 0 drawn, 2 wrong input or a library that is missing.",
+    )
+    parser.add_argument("directory", metavar="RUN", help="directory of a run")
+    parser.add_argument("-o", "--output", default="picture.png", metavar="FILE", help=f"{ENDINGS}; default %(default)s")
+    parser.add_argument(
+        "-f",
+        "--field",
+        default="velocity",
+        help="what colours the particles: a field, the length of a vector, velocity.x, cauchy_stress.xy or von_mises; "
+        "default %(default)s",
+    )
+    parser.add_argument("--frames", metavar="WHICH", help="such as -1, 0,5,10 or ::2; default -1 for a PNG, else all")
+    parser.add_argument(
+        "--limits", type=_numbers(2), metavar="LOW,HIGH", help="range of the colours; default all of it"
+    )
+    parser.add_argument("--colours", default="viridis", help="colour map of matplotlib; default %(default)s")
+    parser.add_argument("--size", type=_numbers(2, int), default=(1000, 700), metavar="W,H", help="pixels")
+    parser.add_argument("--view", type=_numbers(3), metavar="X,Y,Z", help="where 3-D is looked at from; y points up")
+    parser.add_argument("--fps", type=float, default=10.0, help="frames per second of a film; default %(default)s")
+    parser.set_defaults(run_command=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw; 0, or 2 when it cannot be."""
+    from ..output import Run
+    from ..pictures import Picture, film, picture
+    from ..pictures.cells import spacing
+
+    try:
+        single = arguments.output.endswith(".png")
+        found = Run(arguments.directory)
+        frames = chosen(len(found), arguments.frames or ("-1" if single else ":"))
+        if single and len(frames) > 1:
+            raise ValueError(f"a PNG shows one frame, --frames {arguments.frames} are {len(frames)}; choose a .gif")
+        view = {} if arguments.view is None else {"view": arguments.view}
+        options = Picture(
+            field=arguments.field,
+            size=arguments.size,
+            colours=arguments.colours,
+            limits=arguments.limits,
+            spacing=spacing(found[0].x),
+            **view,
+        )
+        if single:
+            path = picture(found[frames[0]], arguments.output, options)
+        else:
+            path = film(found, arguments.output, options, frames=frames, fps=arguments.fps)
+    except (ValueError, OSError, ModuleNotFoundError) as error:
+        return complain(error)
+    print(path)
+    return 0
+
+
+def _numbers(count: int, kind: type = float):
+    def parse(text: str) -> tuple:
+        try:
+            values = tuple(kind(part) for part in text.split(","))
+        except ValueError:
+            values = ()
+        if len(values) != count:
+            raise argparse.ArgumentTypeError(f"must be {count} numbers with commas between them, got {text!r}")
+        return values
+
+    return parse

@@ -1,0 +1,32 @@
+"""The cells that particles are drawn as."""
+
+import numpy as np
+
+from ..output.reader import RunFrame
+
+SAMPLE = 100  # particles whose nearest neighbour is looked for
+
+
+def spacing(x: np.ndarray) -> float:
+    """Median distance from a particle to its nearest neighbour [m], of a sample; 1 for a single particle."""
+    if len(x) < 2:
+        return 1.0
+    found = []
+    for a in np.unique(np.linspace(0, len(x) - 1, SAMPLE).astype(int)):
+        square = np.square(x - x[a]).sum(axis=1)
+        square[a] = np.inf
+        found.append(np.sqrt(square.min()))
+    return float(np.median(found))
+
+
+def corners(frame: RunFrame, size: float) -> np.ndarray:
+    """Corners of each particle's cell [m], (n, 2^dim, dim): x_a + F_a c with c those of a cube of edge ``size`` [m].
+
+    Corner k has the bits of k as its places along the axes. Without a deformation gradient cells stay cubes.
+    """
+    x = frame.x.astype(float)
+    dim = x.shape[1]
+    unit = np.array([[(k >> i & 1) - 0.5 for i in range(dim)] for k in range(2**dim)])
+    F = frame.F if "deformation_gradient" in frame.units else np.eye(dim)[None]
+    offsets = np.einsum("nij,kj->nki", F.astype(float), size * unit)
+    return x[:, None, :] + offsets

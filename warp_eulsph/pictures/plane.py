@@ -1,0 +1,79 @@
+"""Pictures in 1-D and 2-D, by matplotlib."""
+
+from typing import Any
+
+import numpy as np
+
+from ..output.reader import RunFrame
+from .cells import corners
+from .quantity import quantity
+
+# Corners of a cell in the order of its outline.
+OUTLINE = [0, 1, 3, 2]
+
+
+def matplotlib_figure(size: tuple[float, float]) -> Any:
+    """A figure of ``size`` pixels that needs no screen.
+
+    Raises:
+        ModuleNotFoundError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError:
+        raise ModuleNotFoundError("pictures need matplotlib: pip install 'warp_eulsph[viz]'") from None
+    figure = Figure(figsize=(size[0] / 100.0, size[1] / 100.0), dpi=100, layout="compressed")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def draw_line(frame: RunFrame, options: Any) -> np.ndarray:
+    """A quantity over x, as an image (height, width, 3) of bytes."""
+    figure = matplotlib_figure(options.size)
+    shown = quantity(frame, options.field)
+    order = np.argsort(frame.x[:, 0])
+    axes = figure.add_subplot()
+    axes.plot(frame.x[order, 0], shown.values[order], ".-", lw=1, ms=4)
+    axes.set(xlabel="x [m]", ylabel=shown.label, title=_title(frame))
+    if options.limits is not None:
+        axes.set_ylim(*_widened(options.limits))
+    if options.extent is not None:
+        axes.set_xlim(*options.extent[:, 0])
+    axes.grid(alpha=0.3)
+    return _image(figure)
+
+
+def draw_plane(frame: RunFrame, options: Any) -> np.ndarray:
+    """Cells coloured by a quantity, as an image (height, width, 3) of bytes."""
+    figure = matplotlib_figure(options.size)
+    from matplotlib.collections import PolyCollection
+
+    shown = quantity(frame, options.field)
+    axes = figure.add_subplot()
+    outlines: Any = corners(frame, options.spacing)[:, OUTLINE]
+    cells = PolyCollection(outlines, array=shown.values, cmap=options.colours)
+    cells.set(edgecolor="face", linewidth=0.2)
+    if options.limits is not None:
+        cells.set_clim(*options.limits)
+    axes.add_collection(cells)
+    extent = options.extent
+    axes.set(xlim=extent[:, 0], ylim=extent[:, 1], aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axes.set_title(_title(frame))
+    bar = figure.colorbar(cells, label=shown.label)
+    bar.formatter.set_powerlimits((-3, 4))
+    return _image(figure)
+
+
+def _title(frame: RunFrame) -> str:
+    return f"t = {frame.time:.6g} s"
+
+
+def _widened(limits: tuple[float, float]) -> tuple[float, float]:
+    margin = 0.05 * (limits[1] - limits[0]) or 1.0
+    return limits[0] - margin, limits[1] + margin
+
+
+def _image(figure: Any) -> np.ndarray:
+    figure.canvas.draw()
+    return np.asarray(figure.canvas.buffer_rgba())[:, :, :3].copy()

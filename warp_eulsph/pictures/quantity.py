@@ -1,0 +1,56 @@
+"""Which number of a frame a picture is coloured by."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..output.reader import DERIVED, RunFrame
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A scalar at each particle.
+
+    Attributes:
+        label: name and unit.
+        values: (n,).
+    """
+
+    label: str
+    values: np.ndarray
+
+
+def quantity(frame: RunFrame, name: str) -> Quantity:
+    """A scalar of a frame by its name.
+
+    Args:
+        frame: of a run.
+        name: of a field that the frame has or derives, such as ``J`` or ``von_mises``; a vector or tensor gives its
+            length; ``velocity.x``, ``cauchy_stress.xy``, ``principal_stresses.z`` give a component.
+
+    Raises:
+        ValueError: no such field or component in the frame.
+    """
+    field, _, component = name.partition(".")
+    units = {**frame.units, **DERIVED}
+    try:
+        values = np.asarray(getattr(frame, field) if field in DERIVED else frame[field], dtype=float)
+    except KeyError:
+        raise ValueError(
+            f"a picture must be coloured by one of {[*frame.units, *DERIVED]}, derived ones only where the snapshots "
+            f"hold stress or deformation gradient, or by a component such as velocity.x; got {name!r}"
+        ) from None
+    rank = values.ndim - 1
+    if component:
+        index = tuple(AXES.find(letter) for letter in component)
+        if len(index) != rank or any(not 0 <= i < size for i, size in zip(index, values.shape[1:], strict=True)):
+            example = f"components such as {field}.{'x' * rank}" if rank else "no components"
+            raise ValueError(f"{field} has {example}, got {name!r}")
+        values = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
+    elif rank:
+        values = np.sqrt(np.square(values).reshape(len(values), -1).sum(axis=1))
+    shown = "von Mises stress" if field == "von_mises" else field.replace("_", " ")
+    shown = f"|{shown}|" if rank and not component else f"{shown} {component}".strip()
+    return Quantity(f"{shown} [{units[field]}]", values)
