@@ -97,7 +97,7 @@ def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tu
     if hasattr(case, "build"):
         if overrides:
             raise ValueError(f"{path} defines CASE, which takes no settings, got {list(overrides)}")
-        return _on(device, case.build), case.until, lambda simulation: recording_of(case.output), case.describe()
+        return _on(device, case.build), case.until, case.recording, case.describe()
     settings = dict(_setting(override) for override in overrides)
     build, until = getattr(module, "build", None), getattr(module, "UNTIL", None)
     if not callable(build) or not isinstance(until, int | float):
