@@ -83,6 +83,7 @@ def test_log_probes_and_description(directory):
     assert run.log["t"][-1] == UNTIL and run.log["momentum"].shape == (len(run.log["t"]), 2)
     assert run.probe_names == ["corner", "hold", "middle", "whole"]
     assert len(run.probes["corner"]["t"]) == run.steps[-1] + 1
+    assert run.probes["corner"].units["v"] == "m/s" and run.probes["hold"].units["t"] == "s"
     assert run.description["simulation"]["dimension"] == 2 and run.state == "done"
     assert run.environment["sessions"][0]["device"]["kind"] == "cpu"
 

@@ -110,7 +110,7 @@ def resume_is_exact(build, before, after):
     arrays, numbers = reachable(whole)
     changed = {path for path, array in arrays.items() if fresh.get(path) != array.numpy().tobytes()}
     assert {"simulation.stepper.U.x", "simulation.stepper.ledger._total"} <= changed, "the walk misses arrays"
-    stored = decode(encode(take(whole, {}, {})))
+    stored = decode(b"".join(encode(take(whole, {}, {}))))
     whole.step(after)
 
     resumed = build()

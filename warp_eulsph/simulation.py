@@ -67,9 +67,9 @@ class Simulation:
         self.device = wp.get_device(device)
         self.boundaries = tuple(boundaries)
         check_reference([body.material for body in self.bodies], reference)
-        self.dilation = dilation
         if not (np.isfinite(dilation) and dilation > 0.0):
             raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
+        self.dilation = dilation
         box = _checked_box(periodic, self.space.dim)
         counts = [len(body.x) for body in self.bodies]
         ends = np.cumsum([0, *counts])

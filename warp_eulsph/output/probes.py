@@ -44,7 +44,7 @@ class Probe(ABC):
 
     @abstractmethod
     def bind(self, simulation: Simulation) -> Measure:
-        """What measures; called at the start of a run, before its first step, and when it is resumed.
+        """What measures; made before the first step, for a run that is resumed too.
 
         Raises:
             ValueError: what is looked at is not in the simulation.
