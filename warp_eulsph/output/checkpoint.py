@@ -66,7 +66,8 @@ def encode(checkpoint: Checkpoint) -> list[bytes | memoryview]:
         "environment": checkpoint.environment,
     }
     flat = (np.ascontiguousarray(array).reshape(-1).view(np.uint8) for array in checkpoint.arrays.values())
-    parts: list[bytes | memoryview] = [FORMAT, json.dumps(header).encode() + b"\n", *map(memoryview, flat)]
+    parts: list[bytes | memoryview] = [FORMAT, json.dumps(header).encode() + b"\n"]
+    parts += [memoryview(array) for array in flat]  # type: ignore[arg-type]
     digest = hashlib.sha256()
     for part in parts:
         digest.update(part)
