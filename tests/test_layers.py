@@ -12,7 +12,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg"},
+    {"space", "linalg", "execution", "atomics", "simd"},
     {"fields", "weights", "materials", "boundaries", "reduce"},
     {"operators"},
     {"scheme", "contact"},

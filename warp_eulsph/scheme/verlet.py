@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import warp as wp
 
+from ..execution import launch
 from ..space import Space
 from .balance import Balance
 from .dissipation import Upwind
@@ -47,8 +48,8 @@ def _make_mean(space: Space) -> Any:
     real, vec = space.real, space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
-    def mean(v_new: wp.array(dtype=vec), v: wp.array(dtype=vec)):
-        a = wp.tid()
+    def mean(first: int, v_new: wp.array(dtype=vec), v: wp.array(dtype=vec)):
+        a = first + wp.tid()
         v[a] = (v[a] + v_new[a]) * real(0.5)
 
     return mean
@@ -87,4 +88,4 @@ class VerletStepper(LaxWendroffStepper):
         wp.copy(half.v, U.v)
 
     def _finish_mean(self, U: Any, half: Any) -> None:
-        wp.launch(_make_mean(self.space), self.n, [U.v, half.v], device=self.device)
+        launch(_make_mean(self.space), self.n, [U.v, half.v], self.device)

@@ -1,0 +1,368 @@
+"""Neighbour search on the CPU by SIMD: particles sorted into cells, then each particle's cells by rows of eight.
+
+The lists are those of the portable search in ``neighbours.py``. Cells are half a support wide and fill the box around
+all particles; along the last axis they are contiguous, so that a particle looks at a few runs of candidates.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..execution import launch
+from ..simd import prelude
+from ..space import Space
+
+# Cell coordinates are rounded, distances are tested exactly: a query a little too wide misses nothing.
+MARGIN = 1.001
+# Candidates are read eight at a time, beyond the last one too.
+SPARE = 8
+CELLS_PER_PARTICLE = 4
+
+
+@functools.cache
+def _make_frame(space: Space) -> Any:
+    """Kernel of one thread: the box around the places, and cells of half a support that fill it.
+
+    ``frame`` becomes (origin x, y, z, cells per metre, largest h), ``sides`` the number of cells along each axis: at
+    most ``most`` altogether, wider ones if need be.
+    """
+    real = space.real
+    vec3 = wp.types.vector(length=3, dtype=real)
+    snippet = f"""
+    {prelude(Space(space.dim, space.real))}
+    T low[3], high[3], longest = 0;
+    for (int i = 0; i < 3; ++i) low[i] = high[i] = place.data[0].c[i];
+    for (int a = 0; a < n; ++a) {{
+        for (int i = 3 - dim; i < 3; ++i) {{
+            T x = place.data[a].c[i];
+            low[i] = x < low[i] ? x : low[i];
+            high[i] = x > high[i] ? x : high[i];
+        }}
+        longest = h.data[a] > longest ? h.data[a] : longest;
+    }}
+    T rate = 2 / (T({MARGIN}) * support * longest);
+    int count[3] = {{1, 1, 1}};
+    for (int tries = 0; tries < 100; ++tries, rate *= T(0.5)) {{
+        double all = 1;
+        for (int i = 0; i < 3; ++i) {{
+            T cells = (high[i] - low[i]) * rate;
+            count[i] = cells < T(1 << 20) ? (int)cells + 1 : 1 << 20;
+            all *= count[i];
+        }}
+        if (all <= most) break;
+        count[0] = count[1] = count[2] = 1;
+    }}
+    for (int i = 0; i < 3; ++i) {{ frame.data[i] = low[i]; sides.data[i] = count[i]; }}
+    frame.data[3] = rate;
+    frame.data[4] = longest;
+    """
+
+    @wp.func_native(snippet)
+    def fill_frame(
+        n: int,
+        place: wp.array(dtype=vec3),
+        h: wp.array(dtype=real),
+        support: real,
+        most: int,
+        frame: wp.array(dtype=real),
+        sides: wp.array(dtype=int),
+    ): ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def frame_cells(
+        place: wp.array(dtype=vec3),
+        h: wp.array(dtype=real),
+        support: real,
+        most: int,
+        frame: wp.array(dtype=real),
+        sides: wp.array(dtype=int),
+    ):
+        fill_frame(place.shape[0], place, h, support, most, frame, sides)
+
+    return frame_cells
+
+
+@functools.cache
+def _make_assign(space: Space) -> Any:
+    """Kernel: the cell that each particle lies in."""
+    real = space.real
+    vec3 = wp.types.vector(length=3, dtype=real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def assign(
+        first: int,
+        place: wp.array(dtype=vec3),
+        frame: wp.array(dtype=real),
+        sides: wp.array(dtype=int),
+        cell: wp.array(dtype=int),
+    ):
+        a = first + wp.tid()
+        number = int(0)
+        for i in range(3):
+            along = (place[a][i] - frame[i]) * frame[3]
+            number = number * sides[i] + wp.clamp(int(along), 0, sides[i] - 1)
+        cell[a] = number
+
+    return assign
+
+
+@functools.cache
+def _make_sort() -> Any:
+    """Kernel of one thread: a stable counting sort; cell c holds ``order[begin[c]:begin[c+1]]``."""
+
+    @wp.func_native("""
+    const int cells = sides.data[0] * sides.data[1] * sides.data[2];
+    for (int c = 0; c <= cells; ++c) begin.data[c] = 0;
+    for (int a = 0; a < n; ++a) ++begin.data[cell.data[a] + 1];
+    for (int c = 0; c < cells; ++c) begin.data[c + 1] += begin.data[c];
+    for (int a = 0; a < n; ++a) order.data[begin.data[cell.data[a]]++] = a;
+    for (int c = cells; c > 0; --c) begin.data[c] = begin.data[c - 1];
+    begin.data[0] = 0;
+    """)
+    def counting_sort(
+        n: int,
+        cell: wp.array(dtype=int),
+        sides: wp.array(dtype=int),
+        begin: wp.array(dtype=int),
+        order: wp.array(dtype=int),
+    ): ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def sort(
+        cell: wp.array(dtype=int), sides: wp.array(dtype=int), begin: wp.array(dtype=int), order: wp.array(dtype=int)
+    ):
+        counting_sort(cell.shape[0], cell, sides, begin, order)
+
+    return sort
+
+
+@functools.cache
+def _make_collect(space: Space) -> Any:
+    """Kernel: place, smoothing length and body in the order of the cells, each in a row of its own."""
+    real = space.real
+    vec3 = wp.types.vector(length=3, dtype=real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def collect(
+        first: int,
+        order: wp.array(dtype=int),
+        place: wp.array(dtype=vec3),
+        h: wp.array(dtype=real),
+        body: wp.array(dtype=int),
+        columns: wp.array2d(dtype=real),
+    ):
+        j = first + wp.tid()
+        a = order[j]
+        for i in range(3):
+            columns[i, j] = place[a][i]
+        columns[3, j] = h[a]
+        columns[4, j] = real(body[a])
+
+    return collect
+
+
+# C++ of one particle's search: ``found(j, hit)`` is called with eight candidates from place j of the order on, and
+# which of them are neighbours or the particle itself (−1, otherwise 0).
+_SEARCH = """
+    typedef T X __attribute__((ext_vector_type(8)));
+    typedef int I __attribute__((ext_vector_type(8)));
+    const size_t width = columns.strides[0] / sizeof(T);
+    const T* column[5];
+    for (int i = 0; i < 5; ++i) column[i] = columns.data + i * width;
+    const T h_a = h.data[a], rate = frame.data[3], own = T(body.data[a]);
+    const T reach = T(0.5) * support * (h_a + frame.data[4]) * T(MARGIN);
+    const int* side = sides.data;
+    auto clamped = [](T x, int most) { x = x > 0 ? x : T(0); return x < T(most) ? (int)x : most; };
+    auto outside = [&](T x, int i, int c) {
+        T low = frame.data[i] + T(c) / rate - x, high = x - frame.data[i] - T(c + 1) / rate;
+        low = low > high ? low : high;
+        return low > 0 ? low : T(0);
+    };
+    auto look = [&](const T* p) __attribute__((always_inline)) {
+        int c0[3], c1[3];
+        for (int i = 0; i < 3; ++i) {
+            c0[i] = clamped((p[i] - reach - frame.data[i]) * rate, side[i] - 1);
+            c1[i] = clamped((p[i] + reach - frame.data[i]) * rate, side[i] - 1);
+        }
+        for (int x = c0[0]; x <= c1[0]; ++x) {
+            const T dx = dim > 2 ? outside(p[0], 0, x) : T(0);
+            for (int y = c0[1]; y <= c1[1]; ++y) {
+                const T dy = dim > 1 ? outside(p[1], 1, y) : T(0);
+                const T left = reach * reach - dx * dx - dy * dy;
+                if (left < 0) continue;
+                const T half = __builtin_sqrt(left);
+                const int first = (x * side[1] + y) * side[2];
+                const int z0 = clamped((p[2] - half - frame.data[2]) * rate, side[2] - 1);
+                const int z1 = clamped((p[2] + half - frame.data[2]) * rate, side[2] - 1);
+                const int last = begin.data[first + z1 + 1];
+                for (int j = begin.data[first + z0]; j < last; j += 8) {
+                    X rr = 0, c;
+                    for (int i = 3 - dim; i < 3; ++i) {
+                        __builtin_memcpy(&c, column[i] + j, sizeof(X));
+                        c -= p[i];
+                        rr += c * c;
+                    }
+                    __builtin_memcpy(&c, column[3] + j, sizeof(X));
+                    c = (c + h_a) * (T(0.5) * support);
+                    auto hit = rr < c * c;
+                    __builtin_memcpy(&c, column[4] + j, sizeof(X));
+                    hit &= c == own;
+                    const I lane = {0, 1, 2, 3, 4, 5, 6, 7};
+                    found(j, __builtin_convertvector(hit, I) & (lane < last - j));
+                }
+            }
+        }
+    };
+"""
+_OPEN = "look(place.data[a].c);"
+# In a periodic box, the particle's images that can reach into it look too.
+_PERIODIC = """
+    for (int x = dim > 2 ? -1 : 0; x <= (dim > 2 ? 1 : 0); ++x)
+        for (int y = dim > 1 ? -1 : 0; y <= (dim > 1 ? 1 : 0); ++y)
+            for (int z = -1; z <= 1; ++z) {
+                const int shift[3] = {x, y, z};
+                T p[3];
+                bool inside = true;
+                for (int i = 0; i < 3; ++i) {
+                    p[i] = place.data[a].c[i];
+                    if (i < 3 - dim || shift[i] == 0) continue;
+                    const T length = box.c[i - 3 + dim];
+                    p[i] += shift[i] * length;
+                    inside = inside && length > 0 && p[i] > -reach && p[i] < length + reach;
+                }
+                if (inside) look(p);
+            }
+"""
+_COUNT = """
+    I hits = 0;
+    auto found = [&](int, I hit) __attribute__((always_inline)) { hits -= hit; };
+    {search}
+    int all = -1;  // the particle itself
+    for (int i = 0; i < 8; ++i) all += hits[i];
+    count.data[a] = all;
+"""
+# Rows are gathered beside the lists, because an append without branches writes one past the end, and then put in
+# order: the rank of an index is the number of smaller ones.
+_FILL = """
+    constexpr int room = 512;
+    int* const row = index.data + start.data[a];
+    const int size = start.data[a + 1] - start.data[a];
+    int some[room + 16], rank[room + 16], n = 0;
+    auto found = [&](int j, I hit) __attribute__((always_inline)) {
+        if (size <= room) {
+            for (int i = 0; i < 8; ++i) {
+                some[n] = order.data[j + i];
+                n += hit[i] & (some[n] != a);
+            }
+            return;
+        }
+        for (int i = 0; i < 8; ++i) {
+            const int b = order.data[j + i];
+            if (!hit[i] || b == a) continue;
+            int k = n++;
+            for (; k > 0 && row[k - 1] > b; --k) row[k] = row[k - 1];
+            row[k] = b;
+        }
+    };
+    {search}
+    if (size > room) return;
+    for (int i = 0; i < 8; ++i) some[n + i] = 0x7fffffff;
+    for (int v = 0; v < size; v += 8) {
+        I x, r = 0;
+        __builtin_memcpy(&x, some + v, sizeof(I));
+        for (int j = 0; j < size; ++j) r -= x > some[j];
+        __builtin_memcpy(rank + v, &r, sizeof(I));
+    }
+    for (int i = 0; i < size; ++i) row[rank[i]] = some[i];
+"""
+
+
+@functools.cache
+def _make_search(space: Space, fill: bool) -> Any:
+    """Kernel: count a row's neighbours, or (``fill``) write them sorted by index."""
+    real, vec = space.real, space.vec
+    vec3 = wp.types.vector(length=3, dtype=real)
+    types, action = _SEARCH.split("\n    const size_t", 1)
+    search = "const size_t" + action + (_PERIODIC if space.periodic else _OPEN)
+    body_ = (_FILL if fill else _COUNT).replace("{search}", search)
+    snippet = prelude(Space(space.dim, space.real)) + f"constexpr T MARGIN = {MARGIN};" + types + body_
+
+    @wp.func_native(snippet)
+    def find(
+        a: int,
+        place: wp.array(dtype=vec3),
+        h: wp.array(dtype=real),
+        body: wp.array(dtype=int),
+        box: vec,
+        support: real,
+        frame: wp.array(dtype=real),
+        sides: wp.array(dtype=int),
+        begin: wp.array(dtype=int),
+        order: wp.array(dtype=int),
+        columns: wp.array2d(dtype=real),
+        count: wp.array(dtype=int),
+        start: wp.array(dtype=int),
+        index: wp.array(dtype=int),
+    ): ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def search_cells(
+        first: int,
+        place: wp.array(dtype=vec3),
+        h: wp.array(dtype=real),
+        body: wp.array(dtype=int),
+        box: vec,
+        support: real,
+        frame: wp.array(dtype=real),
+        sides: wp.array(dtype=int),
+        begin: wp.array(dtype=int),
+        order: wp.array(dtype=int),
+        columns: wp.array2d(dtype=real),
+        count: wp.array(dtype=int),
+        start: wp.array(dtype=int),
+        index: wp.array(dtype=int),
+    ):
+        a = first + wp.tid()
+        find(a, place, h, body, box, support, frame, sides, begin, order, columns, count, start, index)
+
+    return search_cells
+
+
+class Cells:
+    """Particles sorted into cells, and the search among them; everything is allocated once.
+
+    Args:
+        space: dimension, precision, periodicity.
+        support: support radius of the weight in smoothing lengths.
+        h: smoothing lengths [m], (n,); those of the moment count at each search.
+        body: body numbers, (n,).
+        box: lengths of the periodic box [m], zero where open; ``vec``.
+        device: the CPU.
+    """
+
+    def __init__(self, space: Space, support: float, h: wp.array, body: wp.array, box: Any, device: Any):
+        n = len(h)
+        self.space, self.support, self.h, self.body, self.box, self.device = space, support, h, body, box, device
+        self._most = CELLS_PER_PARTICLE * n + 64
+        self._frame = wp.zeros(5, dtype=space.real, device=device)
+        self._sides = wp.zeros(3, dtype=int, device=device)
+        self._cell = wp.zeros(n, dtype=int, device=device)
+        self._begin = wp.zeros(self._most + 1, dtype=int, device=device)
+        self._order = wp.zeros(n + SPARE, dtype=int, device=device)
+        self._columns = wp.zeros((5, n + SPARE), dtype=space.real, device=device)
+
+    def sort(self, place: wp.array) -> None:
+        """Sort the particles at ``place`` [m], (n,) of 3-vectors whose last components are the coordinates."""
+        n = len(place)
+        arguments = [place, self.h, self.support, self._most, self._frame, self._sides]
+        wp.launch(_make_frame(self.space), 1, arguments, device=self.device)
+        launch(_make_assign(self.space), n, [place, self._frame, self._sides, self._cell], self.device)
+        wp.launch(_make_sort(), 1, [self._cell, self._sides, self._begin, self._order], device=self.device)
+        launch(_make_collect(self.space), n, [self._order, place, self.h, self.body, self._columns], self.device)
+
+    def search(self, place: wp.array, count: wp.array, start: wp.array, index: wp.array, fill: bool) -> None:
+        """Count the neighbours of each particle, or (``fill``) write them into the rows that ``start`` gives."""
+        arguments = [place, self.h, self.body, self.box, self.support, self._frame, self._sides]
+        arguments += [self._begin, self._order, self._columns, count, start, index]
+        launch(_make_search(self.space, fill), len(place), arguments, self.device)
