@@ -35,7 +35,10 @@ def prelude(space: Space) -> str:
     if space.periodic:
         image = f"""
         V image_box = 0, image_rate = 0;
-        for (int i = 0; i < {space.dim}; ++i) if (box.c[i] > 0) {{ image_box[i] = box.c[i]; image_rate[i] = 1 / box.c[i]; }}
+        for (int i = 0; i < {space.dim}; ++i) {{
+            image_box[i] = box.c[i];
+            image_rate[i] = box.c[i] > 0 ? 1 / box.c[i] : 0;
+        }}
         """
     nearest = "d - image_box * __builtin_elementwise_rint(d * image_rate)" if space.periodic else "d"
     return f"""

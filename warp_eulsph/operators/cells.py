@@ -1,7 +1,7 @@
 """Neighbour search on the CPU by SIMD: particles sorted into cells, then each particle's cells by rows of eight.
 
-The lists are those of the portable search in ``neighbours.py``. Cells are half a support wide and fill the box around
-all particles; along the last axis they are contiguous, so that a particle looks at a few runs of candidates.
+The lists are those of the portable search in ``neighbours.py``. Cells fill the box around all particles; along the last axis
+they are contiguous, so that a particle looks at a few runs of candidates.
 """
 
 import functools
@@ -18,17 +18,20 @@ MARGIN = 1.001
 # Candidates are read eight at a time, beyond the last one too.
 SPARE = 8
 CELLS_PER_PARTICLE = 4
+# Along x, y, z: wide columns, short cells along them, so that few columns are opened and few candidates are in vain.
+CELLS_PER_SUPPORT = (1, 1, 3)
 
 
 @functools.cache
 def _make_frame(space: Space) -> Any:
-    """Kernel of one thread: the box around the places, and cells of half a support that fill it.
+    """Kernel of one thread: the box around the places, and cells that fill it.
 
-    ``frame`` becomes (origin x, y, z, cells per metre, largest h), ``sides`` the number of cells along each axis: at
-    most ``most`` altogether, wider ones if need be.
+    ``frame`` becomes (origin x, y, z; cells per metre along x, y, z; largest h), ``sides`` the number of cells along
+    each axis: at most ``most`` altogether, wider ones if need be.
     """
     real = space.real
     vec3 = wp.types.vector(length=3, dtype=real)
+    divisions = ", ".join(map(str, CELLS_PER_SUPPORT))
     snippet = f"""
     {prelude(Space(space.dim, space.real))}
     T low[3], high[3], longest = 0;
@@ -41,21 +44,22 @@ def _make_frame(space: Space) -> Any:
         }}
         longest = h.data[a] > longest ? h.data[a] : longest;
     }}
-    T rate = 2 / (T({MARGIN}) * support * longest);
+    T rate[3], divisions[3] = {{{divisions}}};
+    for (int i = 0; i < 3; ++i) rate[i] = divisions[i] / (T({MARGIN}) * support * longest);
     int count[3] = {{1, 1, 1}};
-    for (int tries = 0; tries < 100; ++tries, rate *= T(0.5)) {{
+    for (int tries = 0; tries < 100; ++tries) {{
         double all = 1;
         for (int i = 0; i < 3; ++i) {{
-            T cells = (high[i] - low[i]) * rate;
+            T cells = (high[i] - low[i]) * rate[i];
             count[i] = cells < T(1 << 20) ? (int)cells + 1 : 1 << 20;
             all *= count[i];
         }}
         if (all <= most) break;
-        count[0] = count[1] = count[2] = 1;
+        for (int i = 0; i < 3; ++i) {{ count[i] = 1; rate[i] *= T(0.5); }}
     }}
     for (int i = 0; i < 3; ++i) {{ frame.data[i] = low[i]; sides.data[i] = count[i]; }}
-    frame.data[3] = rate;
-    frame.data[4] = longest;
+    for (int i = 0; i < 3; ++i) frame.data[3 + i] = rate[i];
+    frame.data[6] = longest;
     """
 
     @wp.func_native(snippet)
@@ -100,7 +104,7 @@ def _make_assign(space: Space) -> Any:
         a = first + wp.tid()
         number = int(0)
         for i in range(3):
-            along = (place[a][i] - frame[i]) * frame[3]
+            along = (place[a][i] - frame[i]) * frame[3 + i]
             number = number * sides[i] + wp.clamp(int(along), 0, sides[i] - 1)
         cell[a] = number
 
@@ -162,39 +166,52 @@ def _make_collect(space: Space) -> Any:
     return collect
 
 
-# C++ of one particle's search: ``found(j, hit)`` is called with eight candidates from place j of the order on, and
-# which of them are neighbours or the particle itself (−1, otherwise 0).
-_SEARCH = """
+_TYPES = """
     typedef T X __attribute__((ext_vector_type(8)));
     typedef int I __attribute__((ext_vector_type(8)));
+    typedef bool B __attribute__((ext_vector_type(8)));
+    // write the chosen ones of eight; up to eight places are overwritten
+    auto append = [](int* to, I b, unsigned char bits) __attribute__((always_inline)) {
+    #if defined(__AVX512VL__)
+        b = (I)__builtin_ia32_compresssi256_mask(b, I{}, bits);
+        __builtin_memcpy(to, &b, sizeof(I));
+    #else
+        for (; bits; bits &= bits - 1) *to++ = b[__builtin_ctz(bits)];
+    #endif
+    };
+"""
+# C++ of one particle's search: ``found(b, bits)`` is called with eight candidates b, and a bit for each of
+# them that is a neighbour.
+_LOOK = """
     const size_t width = columns.strides[0] / sizeof(T);
     const T* column[5];
     for (int i = 0; i < 5; ++i) column[i] = columns.data + i * width;
-    const T h_a = h.data[a], rate = frame.data[3], own = T(body.data[a]);
-    const T reach = T(0.5) * support * (h_a + frame.data[4]) * T(MARGIN);
+    const T h_a = h.data[a], own = T(body.data[a]);
+    const T* const rate = frame.data + 3;
+    const T reach = T(0.5) * support * (h_a + frame.data[6]) * T(MARGIN);
     const int* side = sides.data;
     auto clamped = [](T x, int most) { x = x > 0 ? x : T(0); return x < T(most) ? (int)x : most; };
-    auto outside = [&](T x, int i, int c) {
-        T low = frame.data[i] + T(c) / rate - x, high = x - frame.data[i] - T(c + 1) / rate;
-        low = low > high ? low : high;
-        return low > 0 ? low : T(0);
+    auto outside = [&](T x, int i, int c) {  // distance of x from slab c of axis i, squared
+        const T low = T(c) - (x - frame.data[i]) * rate[i], high = -low - 1;
+        const T out = (low > high ? low : high) / rate[i];
+        return out > 0 ? out * out : T(0);
     };
     auto look = [&](const T* p) __attribute__((always_inline)) {
         int c0[3], c1[3];
         for (int i = 0; i < 3; ++i) {
-            c0[i] = clamped((p[i] - reach - frame.data[i]) * rate, side[i] - 1);
-            c1[i] = clamped((p[i] + reach - frame.data[i]) * rate, side[i] - 1);
+            c0[i] = clamped((p[i] - reach - frame.data[i]) * rate[i], side[i] - 1);
+            c1[i] = clamped((p[i] + reach - frame.data[i]) * rate[i], side[i] - 1);
         }
         for (int x = c0[0]; x <= c1[0]; ++x) {
             const T dx = dim > 2 ? outside(p[0], 0, x) : T(0);
             for (int y = c0[1]; y <= c1[1]; ++y) {
                 const T dy = dim > 1 ? outside(p[1], 1, y) : T(0);
-                const T left = reach * reach - dx * dx - dy * dy;
+                const T left = reach * reach - dx - dy;
                 if (left < 0) continue;
                 const T half = __builtin_sqrt(left);
                 const int first = (x * side[1] + y) * side[2];
-                const int z0 = clamped((p[2] - half - frame.data[2]) * rate, side[2] - 1);
-                const int z1 = clamped((p[2] + half - frame.data[2]) * rate, side[2] - 1);
+                const int z0 = clamped((p[2] - half - frame.data[2]) * rate[2], side[2] - 1);
+                const int z1 = clamped((p[2] + half - frame.data[2]) * rate[2], side[2] - 1);
                 const int last = begin.data[first + z1 + 1];
                 for (int j = begin.data[first + z0]; j < last; j += 8) {
                     X rr = 0, c;
@@ -209,7 +226,13 @@ _SEARCH = """
                     __builtin_memcpy(&c, column[4] + j, sizeof(X));
                     hit &= c == own;
                     const I lane = {0, 1, 2, 3, 4, 5, 6, 7};
-                    found(j, __builtin_convertvector(hit, I) & (lane < last - j));
+                    I b;
+                    __builtin_memcpy(&b, order.data + j, sizeof(I));
+                    const I wanted = __builtin_convertvector(hit, I) & (lane < last - j) & (b != a);
+                    const B chosen = __builtin_convertvector(wanted, B);
+                    unsigned char bits;
+                    __builtin_memcpy(&bits, &chosen, 1);
+                    found(b, bits);
                 }
             }
         }
@@ -235,39 +258,41 @@ _PERIODIC = """
             }
 """
 _COUNT = """
-    I hits = 0;
-    auto found = [&](int, I hit) __attribute__((always_inline)) { hits -= hit; };
+    int* const kept = scratch.data + (size_t)a * stride;
+    int n = 0;
+    auto found = [&](I b, unsigned char bits) __attribute__((always_inline)) {
+        if (n + 8 <= stride) append(kept + n, b, bits);
+        n += __builtin_popcount(bits);
+    };
     {search}
-    int all = -1;  // the particle itself
-    for (int i = 0; i < 8; ++i) all += hits[i];
-    count.data[a] = all;
+    count.data[a] = n;
 """
-# Rows are gathered beside the lists, because an append without branches writes one past the end, and then put in
-# order: the rank of an index is the number of smaller ones.
+# A row is put in order by ranks: the rank of an index is the number of smaller ones. Rows that the count has no room
+# for are searched again, long ones sorted by insertion.
 _FILL = """
     constexpr int room = 512;
     int* const row = index.data + start.data[a];
     const int size = start.data[a + 1] - start.data[a];
     int some[room + 16], rank[room + 16], n = 0;
-    auto found = [&](int j, I hit) __attribute__((always_inline)) {
+    auto found = [&](I b, unsigned char bits) __attribute__((always_inline)) {
         if (size <= room) {
-            for (int i = 0; i < 8; ++i) {
-                some[n] = order.data[j + i];
-                n += hit[i] & (some[n] != a);
-            }
+            append(some + n, b, bits);
+            n += __builtin_popcount(bits);
             return;
         }
-        for (int i = 0; i < 8; ++i) {
-            const int b = order.data[j + i];
-            if (!hit[i] || b == a) continue;
+        for (; bits; bits &= bits - 1) {
             int k = n++;
-            for (; k > 0 && row[k - 1] > b; --k) row[k] = row[k - 1];
-            row[k] = b;
+            for (; k > 0 && row[k - 1] > b[__builtin_ctz(bits)]; --k) row[k] = row[k - 1];
+            row[k] = b[__builtin_ctz(bits)];
         }
     };
-    {search}
-    if (size > room) return;
-    for (int i = 0; i < 8; ++i) some[n + i] = 0x7fffffff;
+    if (size <= room && size + 8 <= stride) {
+        __builtin_memcpy(some, scratch.data + (size_t)a * stride, size * sizeof(int));
+    } else {
+        {search}
+        if (size > room) return;
+    }
+    for (int i = 0; i < 8; ++i) some[size + i] = 0x7fffffff;
     for (int v = 0; v < size; v += 8) {
         I x, r = 0;
         __builtin_memcpy(&x, some + v, sizeof(I));
@@ -283,10 +308,9 @@ def _make_search(space: Space, fill: bool) -> Any:
     """Kernel: count a row's neighbours, or (``fill``) write them sorted by index."""
     real, vec = space.real, space.vec
     vec3 = wp.types.vector(length=3, dtype=real)
-    types, action = _SEARCH.split("\n    const size_t", 1)
-    search = "const size_t" + action + (_PERIODIC if space.periodic else _OPEN)
-    body_ = (_FILL if fill else _COUNT).replace("{search}", search)
-    snippet = prelude(Space(space.dim, space.real)) + f"constexpr T MARGIN = {MARGIN};" + types + body_
+    search = _LOOK + (_PERIODIC if space.periodic else _OPEN)
+    action = (_FILL if fill else _COUNT).replace("{search}", search)
+    snippet = prelude(Space(space.dim, space.real)) + f"constexpr T MARGIN = {MARGIN};" + _TYPES + action
 
     @wp.func_native(snippet)
     def find(
@@ -304,6 +328,8 @@ def _make_search(space: Space, fill: bool) -> Any:
         count: wp.array(dtype=int),
         start: wp.array(dtype=int),
         index: wp.array(dtype=int),
+        scratch: wp.array(dtype=int),
+        stride: int,
     ): ...
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -322,9 +348,11 @@ def _make_search(space: Space, fill: bool) -> Any:
         count: wp.array(dtype=int),
         start: wp.array(dtype=int),
         index: wp.array(dtype=int),
+        scratch: wp.array(dtype=int),
+        stride: int,
     ):
         a = first + wp.tid()
-        find(a, place, h, body, box, support, frame, sides, begin, order, columns, count, start, index)
+        find(a, place, h, body, box, support, frame, sides, begin, order, columns, count, start, index, scratch, stride)
 
     return search_cells
 
@@ -345,7 +373,7 @@ class Cells:
         n = len(h)
         self.space, self.support, self.h, self.body, self.box, self.device = space, support, h, body, box, device
         self._most = CELLS_PER_PARTICLE * n + 64
-        self._frame = wp.zeros(5, dtype=space.real, device=device)
+        self._frame = wp.zeros(7, dtype=space.real, device=device)
         self._sides = wp.zeros(3, dtype=int, device=device)
         self._cell = wp.zeros(n, dtype=int, device=device)
         self._begin = wp.zeros(self._most + 1, dtype=int, device=device)
@@ -361,8 +389,16 @@ class Cells:
         wp.launch(_make_sort(), 1, [self._cell, self._sides, self._begin, self._order], device=self.device)
         launch(_make_collect(self.space), n, [self._order, place, self.h, self.body, self._columns], self.device)
 
-    def search(self, place: wp.array, count: wp.array, start: wp.array, index: wp.array, fill: bool) -> None:
-        """Count the neighbours of each particle, or (``fill``) write them into the rows that ``start`` gives."""
+    def search(
+        self, place: wp.array, count: wp.array, start: wp.array, index: wp.array, scratch: wp.array, fill: bool
+    ) -> None:
+        """Count the neighbours of each particle, or (``fill``) write them into the rows that ``start`` gives.
+
+        ``scratch``, (k,) of reals, is to be left alone between the two: the count keeps there what it finds, as far as
+        it goes.
+        """
+        size = len(scratch) * wp.types.type_size_in_bytes(self.space.real) // 4
+        room = wp.array(ptr=scratch.ptr, shape=size, dtype=int, device=self.device)
         arguments = [place, self.h, self.body, self.box, self.support, self._frame, self._sides]
-        arguments += [self._begin, self._order, self._columns, count, start, index]
+        arguments += [self._begin, self._order, self._columns, count, start, index, room, size // len(place)]
         launch(_make_search(self.space, fill), len(place), arguments, self.device)

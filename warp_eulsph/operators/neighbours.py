@@ -174,18 +174,19 @@ class NeighbourLists:
             self.grid.build(self.padded, self.support * self.h_max * QUERY_MARGIN, groups=self.body)
         else:
             self.cells.sort(self.padded)
-        self._search(x, fill=False)
+        scratch = self.rows.w
+        self._search(x, scratch, fill=False)
         wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
         pairs = self.pairs
         if pairs > self.capacity:
             # A quarter more than needed, so that a moving reference grows its lists seldom.
             self._reserve(pairs + pairs // 4)
             log.debug("neighbour lists grew to %d pairs", self.capacity)
-        self._search(x, fill=True)
+        self._search(x, scratch, fill=True)
 
-    def _search(self, x: wp.array, fill: bool) -> None:
+    def _search(self, x: wp.array, scratch: wp.array, fill: bool) -> None:
         if self.cells is not None:
-            self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, fill)
+            self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, scratch, fill)
             return
         arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self.h_max]
         arguments += [self.count, self.rows.start, self.rows.index]

@@ -17,7 +17,7 @@ class Weight(ABC):
 
     support: ClassVar[float]
     sigma: ClassVar[tuple[float, float, float]]
-    #: −w'(q)/q once more, as a C++ expression of the vector ``q`` for SIMD kernels: ``T`` is its scalar, ``V`` its type.
+    #: −w'(q)/q once more, in C++ for SIMD kernels: an expression of the vector q, of type V with components of type T.
     slope_cpp: ClassVar[str]
 
     @abstractmethod
