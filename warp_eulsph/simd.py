@@ -35,6 +35,7 @@ def prelude(space: Space) -> str:
     if space.periodic:
         image = f"""
         V image_box = 0, image_rate = 0;
+        #pragma unroll
         for (int i = 0; i < {space.dim}; ++i) {{
             image_box[i] = box.c[i];
             image_rate[i] = box.c[i] > 0 ? 1 / box.c[i] : 0;
@@ -49,11 +50,13 @@ def prelude(space: Space) -> str:
     {image}
     auto load = [](const T* p) __attribute__((always_inline)) {{
         V v = 0;
+        #pragma unroll
         for (int i = 0; i < dim; ++i) v[i] = p[i];
         return v;
     }};
     auto store = [](V v) __attribute__((always_inline)) {{
         wp::vec_t<dim, T> out;
+        #pragma unroll
         for (int i = 0; i < dim; ++i) out.c[i] = v[i];
         return out;
     }};
@@ -72,6 +75,7 @@ def prelude(space: Space) -> str:
         V c[4];
         turn(p, c);
         V s = c[0];
+        #pragma unroll
         for (int i = 1; i < dim; ++i) s += c[i];
         return s;
     }};
@@ -90,7 +94,13 @@ BY_FOUR = """
     if (k < end) {
         int some[4] = {a, a, a, a};
         V some_w = 0;
-        for (int i = 0; k + i < end; ++i) { some[i] = index.data[k + i]; some_w[i] = w.data[k + i]; }
+        #pragma unroll
+        for (int i = 0; i < 3; ++i) {
+            if (k + i < end) {
+                some[i] = index.data[k + i];
+                some_w[i] = w.data[k + i];
+            }
+        }
         four(some, some_w);
     }
 """

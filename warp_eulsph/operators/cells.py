@@ -1,7 +1,7 @@
 """Neighbour search on the CPU by SIMD: particles sorted into cells, then each particle's cells by rows of eight.
 
-The lists are those of the portable search in ``neighbours.py``. Cells fill the box around all particles; along the last axis
-they are contiguous, so that a particle looks at a few runs of candidates.
+The lists are those of the portable search in ``neighbours.py``. Cells fill the box around all particles; along the last
+axis they are contiguous, so that a particle looks at a few runs of candidates.
 """
 
 import functools

@@ -68,9 +68,11 @@ def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
     const V x_a = load(x.data[a].c);
     const T h_a = h.data[a];
     V sums[dim * dim], row = 0, diagonal = 0;
+    #pragma unroll
     for (int i = 0; i < dim * dim; ++i) sums[i] = 0;
     auto four = [&](int k, int many) __attribute__((always_inline)) {{
         V p[4], xi[4], h_ab = 0, V_b = 0, m_b = 0;
+        #pragma unroll
         for (int i = 0; i < 4; ++i) {{
             const int b = i < many ? index.data[k + i] : a;
             p[i] = nearest(load(x.data[b].c) - x_a);
@@ -80,14 +82,17 @@ def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
         }}
         turn(p, xi);
         V rr = 0;
+        #pragma unroll
         for (int i = 0; i < dim; ++i) rr += xi[i] * xi[i];
         const V rate = 1 / h_ab, q = __builtin_elementwise_sqrt(rr) * rate;
         V g = slope(q) * T({sigma!r});
+        #pragma unroll
         for (int i = 0; i < dim + 2; ++i) g *= rate;
         g = q < T({weight.support!r}) ? g : (V)0;
         const V w_ab = g * V_b;
         if (many == 4) __builtin_memcpy(w.data + k, &w_ab, sizeof(V));
         else for (int i = 0; i < many; ++i) w.data[k + i] = w_ab[i];
+        #pragma unroll
         for (int i = 0; i < dim; ++i) for (int j = 0; j <= i; ++j) sums[i * dim + j] += xi[i] * xi[j] * w_ab;
         row += g * m_b;
         diagonal += w_ab;
@@ -96,6 +101,7 @@ def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
     for (; k + 4 <= end; k += 4) four(k, 4);
     if (k < end) four(k, end - k);
     auto sum = [](V v) {{ return (v[0] + v[1]) + (v[2] + v[3]); }};
+    #pragma unroll
     for (int i = 0; i < dim; ++i) for (int j = 0; j <= i; ++j)
         K.data[a].data[i][j] = K.data[a].data[j][i] = sum(sums[i * dim + j]);
     rows.data[a] = sum(row);

@@ -83,14 +83,17 @@ def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
     {prelude(space)}
     const V f_a = load(f.data[a].c), x_a = load(x.data[a].c);
     V sums[dim];
+    #pragma unroll
     for (int i = 0; i < dim; ++i) sums[i] = 0;
     for (int k = begin; k < end; ++k) {{
         const int b = index.data[k];
         const V df = {"nearest" if of_positions else ""}(load(f.data[b].c) - f_a);
         const V dx = nearest(load(x.data[b].c) - x_a) * w.data[k];
+        #pragma unroll
         for (int i = 0; i < dim; ++i) sums[i] += df[i] * dx;
     }}
     wp::mat_t<dim, dim, T> out;
+    #pragma unroll
     for (int i = 0; i < dim; ++i) for (int j = 0; j < dim; ++j) out.data[i][j] = sums[i][j];
     return out;
     """
@@ -137,10 +140,12 @@ def flux_sum(space: Space, simd: bool) -> Any:
     {prelude(space)}
     const V x_a = load(x.data[a].c);
     V Q_a[dim], sums[4] = {{0, 0, 0, 0}};
+    #pragma unroll
     for (int i = 0; i < dim; ++i) Q_a[i] = load(Q.data[a].data[i]);
     for (int k = begin; k < end; ++k) {{
         const int b = index.data[k];
         const V dx = nearest(load(x.data[b].c) - x_a) * w.data[k];
+        #pragma unroll
         for (int i = 0; i < dim; ++i) sums[i] += (Q_a[i] + load(Q.data[b].data[i])) * dx;
     }}
     return store(lane_sums(sums));

@@ -63,6 +63,7 @@ def _make_forces(space: Space) -> Any:
     const V* const A = all + (size_t)a * (2 + 2 * dim);
     const V x_a = A[0], v_a = A[1];
     V grad_a[dim], Pi_a[dim], internal = 0, dissipation = 0;
+    #pragma unroll
     for (int j = 0; j < dim; ++j) {{
         grad_a[j] = A[2 + j];
         Pi_a[j] = A[2 + dim + j];
@@ -70,17 +71,20 @@ def _make_forces(space: Space) -> Any:
     }}
     auto four = [&](const int* b, V w) __attribute__((always_inline)) {{
         V xi[4], jump[4], squares[4], along[4], Z, Z_shear;
+        #pragma unroll
         for (int i = 0; i < 4; ++i) {{
             const V* const B = all + (size_t)b[i] * (2 + 2 * dim);
             xi[i] = nearest(B[0] - x_a);
             Z[i] = B[0][3];
             Z_shear[i] = B[1][3];
             V mean = (grad_a[0] + B[2]) * xi[i][0];
+            #pragma unroll
             for (int j = 1; j < dim; ++j) mean += (grad_a[j] + B[2 + j]) * xi[i][j];
             jump[i] = B[1] - v_a - T(0.5) * mean;
             squares[i] = xi[i] * xi[i];
             along[i] = xi[i] * jump[i];
             V force = 0;
+            #pragma unroll
             for (int j = 0; j < dim; ++j) {{
                 const V P = Pi_a[j] + B[2 + dim + j];
                 force += P * ({balanced});
@@ -93,6 +97,7 @@ def _make_forces(space: Space) -> Any:
         Z_shear += v_a[3];
         const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon);
         const V normal = lane_sums(along) * (Z - Z_shear) / rr * area, shear = Z_shear * area;
+        #pragma unroll
         for (int i = 0; i < 4; ++i) dissipation += xi[i] * normal[i] + jump[i] * shear[i];
     }};
     {BY_FOUR}
