@@ -17,14 +17,18 @@ LAYERS = [
     {"operators"},
     {"scheme", "contact"},
     {"simulation", "schedule", "diagnostics", "output", "geometry"},
-    {"validation"},
+    {"validation", "bench"},
     {"cases", "cli", "__main__"},
 ]
 LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 # The front door shows rooms up to the simulation: those above may come in by it.
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
-FRONT_ENDS = {"validation/command.py", "validation/step_cost.py"}  # what the command line prints is its result
+FRONT_ENDS = {
+    "bench/command.py",
+    "validation/command.py",
+    "validation/step_cost.py",
+}  # what the command line prints is its result
 
 
 def room(path):
