@@ -24,11 +24,8 @@ LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 # The front door shows rooms up to the simulation: those above may come in by it.
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
-FRONT_ENDS = {
-    "bench/command.py",
-    "validation/command.py",
-    "validation/step_cost.py",
-}  # what the command line prints is its result
+# What the command line prints is its result
+FRONT_ENDS = {"bench/command.py", "validation/command.py", "validation/step_cost.py"}
 
 
 def room(path):

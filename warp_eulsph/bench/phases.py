@@ -1,7 +1,7 @@
 """Where the time of a step goes: its parts by name, each timed around what the step calls."""
 
 import time
-from collections import Counter
+from collections import defaultdict
 from typing import Any
 
 #: Parts of a step, and the methods that do them: attributes of the stepper, dots lead to its members.
@@ -24,7 +24,7 @@ class PhaseClock:
     """Seconds spent in each phase of a stepper's steps from now on; inner phases are taken out of outer ones."""
 
     def __init__(self, stepper: Any):
-        self.seconds: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
         self._inner: list[float] = []
         for phase, methods in PHASES.items():
             for method in methods:
