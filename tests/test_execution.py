@@ -142,6 +142,21 @@ def test_long_rows_and_far_away_particles_are_found():
     assert all(np.array_equal(*both) for both in zip(found[False], found[True], strict=True))
 
 
+def test_steps_record_their_launches_once():
+    """A launch that is recorded anew in every step costs as much as none recorded, and piles up."""
+    simulation = disordered(2, wp.float64, es.Always())
+    stepper = simulation.stepper
+    lists = stepper.configuration.lists
+    owners = [stepper, stepper.flux, stepper.ledger, stepper.clock, stepper.configuration, stepper.stabiliser]
+    owners += [lists, lists.cells, stepper.stabiliser._in_one_pass or stepper]
+    recorded = []
+    for _ in range(4):
+        simulation.step(4)
+        recorded.append([len(owner._launch._recorded) for owner in owners])
+    assert recorded[1:] == recorded[:1] * 3
+    assert sum(recorded[0]) > 20
+
+
 def test_bad_settings_are_named():
     with pytest.raises(ValueError, match="threads must be at least 1, got 0"):
         execution.set_threads(0)

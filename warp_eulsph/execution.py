@@ -19,6 +19,8 @@ import warp as wp
 LEAST_RANGE = 512
 # More ranges than threads, so that a core that is busy elsewhere takes fewer of them.
 RANGES_PER_THREAD = 4
+# Launches that an object repeats are a few dozen; arguments that are made anew each time must not pile up.
+MOST_RECORDED = 256
 
 
 def _cores() -> int:
@@ -65,26 +67,54 @@ def simd(device: Any) -> bool:
     return _simd and wp.get_device(device).is_cpu
 
 
-def launch(kernel: Any, n: int, arguments: Sequence[Any], device: Any, first: int = 0) -> None:
-    """Launch a kernel over particles ``first`` … ``first + n − 1``, in ranges on several threads on the CPU.
+class Launcher:
+    """Launches of one object on one device, recorded: a repeated one costs a fifth of ``wp.launch``.
 
-    The kernel's first parameter, which is not among ``arguments``, is the index that its thread 0 has. It must write to
-    its own particle only.
+    Two launches are the same if kernel, extent and arguments are: numbers equal, arrays and structs the same objects.
+    What fields of a struct point to may change in between.
     """
-    ranges = _ranges(n) if wp.get_device(device).is_cpu else [(0, n)]
-    if len(ranges) == 1:
-        wp.launch(kernel, n, [first, *arguments], device=device)
-        return
-    commands = [
-        wp.launch(kernel, end - begin, [first + begin, *arguments], device=device, record_cmd=True)
-        for begin, end in ranges
-    ]
-    # A launch on the CPU releases the interpreter's lock while it runs; whoever is free takes the next range.
-    rest = iter(commands)
-    waiting = [_workers().submit(_take, rest) for _ in range(_threads - 1)]
-    _take(rest)
-    for worker in waiting:
-        worker.result()
+
+    def __init__(self, device: Any):
+        self.device = wp.get_device(device)
+        self._recorded: dict[tuple[Any, ...], tuple[list[Any], Any]] = {}
+
+    def __call__(self, kernel: Any, n: int, arguments: Sequence[Any], first: int = 0) -> None:
+        """Launch over particles ``first`` … ``first + n − 1``, in ranges on several threads on the CPU.
+
+        The kernel's first parameter, which is not among ``arguments``, is the index that its thread 0 has. It must
+        write to its own particle only.
+        """
+        ranges = _ranges(n) if self.device.is_cpu else ((0, n),)
+        commands = self._commands(kernel, ranges, arguments, first)
+        if len(ranges) == 1:
+            commands[0].launch()
+            return
+        # A launch on the CPU releases the interpreter's lock while it runs; whoever is free takes the next range.
+        rest = iter(commands)
+        waiting = [_workers().submit(_take, rest) for _ in range(_threads - 1)]
+        _take(rest)
+        for worker in waiting:
+            worker.result()
+
+    def once(self, kernel: Any, dim: int, arguments: Sequence[Any]) -> None:
+        """Launch a kernel of ``dim`` threads that has no such parameter, in one piece."""
+        self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
+
+    def _commands(
+        self, kernel: Any, ranges: tuple[tuple[int, int], ...], arguments: Sequence[Any], first: int | None
+    ) -> list[Any]:
+        key = (kernel, ranges, first, *[a if isinstance(a, (int, float)) else id(a) for a in arguments])
+        known = self._recorded.get(key)
+        if known is None:
+            if len(self._recorded) >= MOST_RECORDED:
+                self._recorded.clear()
+            lead = [[] if first is None else [first + begin] for begin, _ in ranges]
+            commands = [
+                wp.launch(kernel, end - begin, [*own, *arguments], device=self.device, record_cmd=True)
+                for own, (begin, end) in zip(lead, ranges, strict=True)
+            ]
+            known = self._recorded[key] = commands, arguments  # keeps the arguments, and so their ids, alive
+        return known[0]
 
 
 def _take(commands: Iterator[Any]) -> None:
@@ -92,13 +122,13 @@ def _take(commands: Iterator[Any]) -> None:
         command.launch()
 
 
-def _ranges(n: int) -> list[tuple[int, int]]:
+def _ranges(n: int) -> tuple[tuple[int, int], ...]:
     """[begin, end) of the ranges that n particles are split into."""
     count = 1 if _threads == 1 else min(_threads * RANGES_PER_THREAD, n // LEAST_RANGE)
     if count <= 1:
-        return [(0, n)]
+        return ((0, n),)
     ends = [n * k // count for k in range(count + 1)]
-    return list(pairwise(ends))
+    return tuple(pairwise(ends))
 
 
 def _workers() -> ThreadPoolExecutor:

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from ..execution import launch
+from ..execution import Launcher
 
 TRIAD_BYTES = 256 * 2**20  # of the three arrays together, beyond any cache
 CHAINS = 12  # independent ones, enough to hide the latency of a multiply-add
@@ -72,15 +72,14 @@ def bandwidth(real: type) -> float:
     """Memory bandwidth [byte/s] of x = y + s z with the present number of threads, two reads and a write counted."""
     item = wp.types.type_size_in_bytes(real)
     count = TRIAD_BYTES // (3 * item * ROWS)
+    launch = Launcher("cpu")
     x, y, z = (wp.zeros(count * ROWS, dtype=real, device="cpu") for _ in range(3))
-    return 3 * item * count * ROWS / _best(lambda: launch(_make_triad(real), count, [0.5, x, y, z], "cpu"))
+    return 3 * item * count * ROWS / _best(lambda: launch(_make_triad(real), count, [0.5, x, y, z]))
 
 
 def arithmetic(real: type) -> float:
     """Floating-point operations per second of fused multiply-adds on full vectors, two operations each."""
     count = 1024
-    out = wp.zeros(count, dtype=real, device="cpu")
+    launch, out = Launcher("cpu"), wp.zeros(count, dtype=real, device="cpu")
     lanes = 64 // wp.types.type_size_in_bytes(real)
-    return (
-        2 * CHAINS * ROUNDS * lanes * count / _best(lambda: launch(_make_multiply_add(real), count, [0.5, out], "cpu"))
-    )
+    return 2 * CHAINS * ROUNDS * lanes * count / _best(lambda: launch(_make_multiply_add(real), count, [0.5, out]))

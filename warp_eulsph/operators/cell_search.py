@@ -1,4 +1,4 @@
-"""The search for one particle's neighbours among particles sorted into cells (``cells.py``), eight candidates at a time."""
+"""The search for one particle's neighbours among particles sorted into cells (``cells.py``), eight at a time."""
 
 import functools
 from typing import Any

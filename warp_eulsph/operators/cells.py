@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from ..execution import launch
+from ..execution import Launcher
 from ..simd import prelude
 from ..space import Space
 from .cell_search import MARGIN, make_search
@@ -180,6 +180,9 @@ class Cells:
     def __init__(self, space: Space, support: float, h: wp.array, body: wp.array, box: Any, device: Any):
         n = len(h)
         self.space, self.support, self.h, self.body, self.box, self.device = space, support, h, body, box, device
+        self._launch = Launcher(device)
+        self._scratch: Any = None
+        self._room: Any = None
         self._most = CELLS_PER_PARTICLE * n + 64
         self._frame = wp.zeros(7, dtype=space.real, device=device)
         self._sides = wp.zeros(3, dtype=int, device=device)
@@ -192,10 +195,10 @@ class Cells:
         """Sort the particles at ``place`` [m], (n,) of 3-vectors whose last components are the coordinates."""
         n = len(place)
         arguments = [place, self.h, self.support, self._most, self._frame, self._sides]
-        wp.launch(_make_frame(self.space), 1, arguments, device=self.device)
-        launch(_make_assign(self.space), n, [place, self._frame, self._sides, self._cell], self.device)
-        wp.launch(_make_sort(), 1, [self._cell, self._sides, self._begin, self._order], device=self.device)
-        launch(_make_collect(self.space), n, [self._order, place, self.h, self.body, self._columns], self.device)
+        self._launch.once(_make_frame(self.space), 1, arguments)
+        self._launch(_make_assign(self.space), n, [place, self._frame, self._sides, self._cell])
+        self._launch.once(_make_sort(), 1, [self._cell, self._sides, self._begin, self._order])
+        self._launch(_make_collect(self.space), n, [self._order, place, self.h, self.body, self._columns])
 
     def search(
         self, place: wp.array, count: wp.array, start: wp.array, index: wp.array, scratch: wp.array, fill: bool
@@ -205,8 +208,18 @@ class Cells:
         ``scratch``, (k,) of reals, is to be left alone between the two: the count keeps there what it finds, as far as
         it goes.
         """
-        size = len(scratch) * wp.types.type_size_in_bytes(self.space.real) // 4
-        room = wp.array(ptr=scratch.ptr, shape=size, dtype=int, device=self.device)
+        if scratch is not self._scratch:
+            size = len(scratch) * wp.types.type_size_in_bytes(self.space.real) // 4
+            self._scratch, self._room = scratch, wp.array(ptr=scratch.ptr, shape=size, dtype=int, device=self.device)
         arguments = [place, self.h, self.body, self.box, self.support, self._frame, self._sides]
-        arguments += [self._begin, self._order, self._columns, count, start, index, room, size // len(place)]
-        launch(make_search(self.space, fill), len(place), arguments, self.device)
+        arguments += [
+            self._begin,
+            self._order,
+            self._columns,
+            count,
+            start,
+            index,
+            self._room,
+            len(self._room) // len(place),
+        ]
+        self._launch(make_search(self.space, fill), len(place), arguments)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..execution import launch, simd
+from ..execution import Launcher, simd
 from ..fields import neighbour_structure
 from ..space import Space, difference
 from ..weights import Weight
@@ -123,7 +123,7 @@ class NeighbourLists:
     """
 
     def __init__(self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any):
-        self.space, self.device = space, device
+        self.space, self.device, self._launch = space, device, Launcher(device)
         self.h, self.body, self.box = h, body, space.vec(*box)
         n = len(h)
         self.support = weight.support
@@ -169,7 +169,7 @@ class NeighbourLists:
         if self.cells is None or self.space.periodic:
             self._measure()
         last = 0 if self.cells is None else 3 - self.space.dim
-        launch(_make_pad(self.space, last), len(x), [x, self.box, self.padded], self.device)
+        self._launch(_make_pad(self.space, last), len(x), [x, self.box, self.padded])
         if self.cells is None:
             self.grid.build(self.padded, self.support * self.h_max * QUERY_MARGIN, groups=self.body)
         else:
@@ -190,4 +190,4 @@ class NeighbourLists:
             return
         arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self.h_max]
         arguments += [self.count, self.rows.start, self.rows.index]
-        launch(_make_search(self.space, fill), len(x), arguments, self.device)
+        self._launch(_make_search(self.space, fill), len(x), arguments)

@@ -7,7 +7,6 @@ from typing import Any
 
 import warp as wp
 
-from ..execution import launch
 from ..fields import neighbour_structure, structure
 from ..linalg import det, inverse
 from ..operators.row_sums import laplacian_sum, outer_sum
@@ -150,10 +149,10 @@ class BalancedPairs(UpwindForces):
         """Balance the new reference."""
         reference, near, n, simd = configuration.fields, configuration.near, len(self.psi), configuration.simd
         configuration.defect(state.surface, self.defect)
-        launch(_make_renew(self.space), n, [reference, self.defect, state.surface], self.device)
+        self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface])
         for sweep in range(self.option.sweeps):
             arguments = [reference, near, self.defect, self.psi, self._other]
-            launch(_make_relax(self.space, simd, sweep == 0), n, arguments, self.device)
+            self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
             self.psi, self._other = self._other, self.psi
-        launch(_make_shift(self.space), n, [self.particles, reference, self.psi, self.option.bound], self.device)
-        launch(_make_correct(self.space, simd), n, [reference, near, configuration.K], self.device)
+        self._launch(_make_shift(self.space), n, [self.particles, reference, self.psi, self.option.bound])
+        self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])

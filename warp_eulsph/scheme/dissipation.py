@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from ..execution import launch
+from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
 from .pair_forces import PairForces
@@ -116,7 +116,7 @@ class UpwindForces(Stabiliser):
     """M9 alone, for references that need no correction."""
 
     def __init__(self, space: Space, device: Any):
-        self.space, self.device = space, device
+        self.space, self.device, self._launch = space, device, Launcher(device)
         self._in_one_pass: PairForces | None = None
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
@@ -141,4 +141,4 @@ class UpwindForces(Stabiliser):
         configuration.divergence(flux.Pi, forces.internal)
         arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
         arguments += [sensor if sensor is not None else v, forces.dissipation]
-        launch(make_dissipation(self.space, sensor is not None), len(v), arguments, self.device)
+        self._launch(make_dissipation(self.space, sensor is not None), len(v), arguments)

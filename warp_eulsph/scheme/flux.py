@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from ..atomics import raise_to
-from ..execution import launch
+from ..execution import Launcher
 from ..fields import allocate, clock_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
 from ..materials import Law, Material
@@ -161,6 +161,7 @@ class Flux:
 
     def __init__(self, space: Space, bodies: list[tuple[Material, int]], particles: Any, device: Any):
         self.space, self.particles, self.device = space, particles, device
+        self._launch = Launcher(device)
         self.parts: list[_Part] = []
         first = 0
         for material, count in bodies:
@@ -179,20 +180,20 @@ class Flux:
         """Q and Π = Q L of the deformation gradients ``F`` (M1, M5)."""
         for part in self.parts:
             arguments = [F, reference, part.constants, self.fields]
-            launch(_make_flux(self.space, part.law), part.size, arguments, self.device, part.first)
+            self._launch(_make_flux(self.space, part.law), part.size, arguments, part.first)
 
     def wave_speeds(self, F: wp.array, reference: Any, clock: Any) -> None:
         """Wave speeds measured in the reference, and their largest rate [1/s] into ``clock.rate``."""
         clock.rate.zero_()
         for part in self.parts:
             arguments = [F, self.particles, reference, part.constants, self.fields, clock]
-            launch(_make_wave_speeds(self.space, part.law), part.size, arguments, self.device, part.first)
+            self._launch(_make_wave_speeds(self.space, part.law), part.size, arguments, part.first)
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""
         for part in self.parts:
             arguments = [F, self.particles, part.constants, out]
-            launch(_make_energy(self.space, part.law), part.size, arguments, self.device, part.first)
+            self._launch(_make_energy(self.space, part.law), part.size, arguments, part.first)
 
     def carry(self, F: wp.array) -> None:
         """Reduce updated F to what each material carries, in place, and update the histories."""
@@ -200,7 +201,7 @@ class Flux:
             if part.law.carry is None:
                 continue
             if part.history is None:
-                launch(_make_carry(self.space, part.law), part.size, [F, part.constants], self.device, part.first)
+                self._launch(_make_carry(self.space, part.law), part.size, [F, part.constants], part.first)
             else:
                 arguments = [part.first, F, part.history, part.constants]
-                wp.launch(_make_carry_history(self.space, part.law), part.size, arguments, device=self.device)
+                self._launch.once(_make_carry_history(self.space, part.law), part.size, arguments)

@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from ..atomics import lower_to
-from ..execution import launch
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import det
 from ..space import Space
@@ -44,6 +44,6 @@ def _make_check(space: Space) -> Any:
     return check
 
 
-def check(space: Space, state: Any, clock: Any, device: Any) -> None:
+def check(launch: Launcher, space: Space, state: Any, clock: Any) -> None:
     """Set ``clock.bad`` to the lowest index of a particle with det F ≤ 0 or a non-finite x, v or F."""
-    launch(_make_check(space), len(state.x), [state, clock], device)
+    launch(_make_check(space), len(state.x), [state, clock])

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import warp as wp
 
 from ..boundaries import Bound
-from ..execution import launch
+from ..execution import Launcher
 from ..fields import allocate, clock_structure, structure
 from ..linalg import cofactor, inverse
 from ..space import Space
@@ -152,6 +152,7 @@ class LaxWendroffStepper:
     ):
         n, device = len(U.x), flux.device
         self.options, self.space, self.device, self.n = options, space, device, n
+        self._launch = Launcher(device)
         self.U, self.half = U, allocate(space, "State", n, device)
         self.particles, self.flux, self.configuration = particles, flux, configuration
         self.policy, self.clock, self.conditions = policy, clock, conditions
@@ -204,7 +205,7 @@ class LaxWendroffStepper:
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
         self.flux.carry(U.F)  # fluids keep J only
-        check(self.space, U, self.clock.fields, self.device)
+        check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
         self.steps += 1
@@ -260,15 +261,15 @@ class LaxWendroffStepper:
 
     def _predict(self, U: Any, half: Any, fraction: float) -> None:
         arguments = [self.particles, U, self.smoothed_F_k, self.grad_v, self.forces, self.clock.fields, fraction, half]
-        launch(_make_predict(self.space), self.n, arguments, self.device)
+        self._launch(_make_predict(self.space), self.n, arguments)
 
     def _kick(self, U: Any) -> None:
         arguments = [self.particles, self.forces, self.clock.fields, U.v]
-        launch(_make_kick(self.space), self.n, arguments, self.device)
+        self._launch(_make_kick(self.space), self.n, arguments)
 
     def _drift(self, U: Any, v: wp.array, fraction: float, out: Any) -> None:
         arguments = [self.configuration.fields, U, v, self.grad_v, self.clock.fields, fraction, out]
-        launch(_make_drift(self.space), self.n, arguments, self.device)
+        self._launch(_make_drift(self.space), self.n, arguments)
 
     def _limit(self, U: Any) -> None:
         if self.limiter is not None:

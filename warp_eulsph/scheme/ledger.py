@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..execution import launch
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..reduce import Sum
 from ..space import Space
@@ -151,6 +151,7 @@ class Ledger:
     ):
         n = len(particles.mass)
         self.space, self.particles, self.flux, self.device = space, particles, flux, device
+        self._launch = Launcher(device)
         self.configuration, self.clock, self.limiter = configuration, clock, limiter
         self._v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
@@ -190,9 +191,9 @@ class Ledger:
         arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
         arguments += [self.clock.fields, forces, self._entries]
         kernel = _make_entries(self.space, self.limiter is not None, smoothed is not None)
-        launch(kernel, len(self._W), arguments, self.device)
+        self._launch(kernel, len(self._W), arguments)
         self._sum_entries(self._entries, self._step)
-        wp.launch(_make_book(), 1, [self._step, self._total], device=self.device)
+        self._launch.once(_make_book(), 1, [self._step, self._total])
 
     def kinetic(self, U: Any) -> float:
         """Kinetic energy [J]; reads the device."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from ..execution import launch
+from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..simd import BY_FOUR, packed_rows, prelude
 from ..space import Space
@@ -141,7 +141,7 @@ class PairForces:
     """The pass at work on n particles."""
 
     def __init__(self, space: Space, n: int, device: Any):
-        self.space, self.device = space, device
+        self.space, self._launch = space, Launcher(device)
         self._rows = packed_rows(space, n, _vectors(space), device)
 
     def compute(
@@ -149,6 +149,6 @@ class PairForces:
     ) -> None:
         """``forces.internal`` (M5) and ``forces.dissipation`` (M9 without a sensor) [N]."""
         n = len(v)
-        launch(_make_pack(self.space), n, [configuration.fields, flux, v, grad_v, self._rows], self.device)
+        self._launch(_make_pack(self.space), n, [configuration.fields, flux, v, grad_v, self._rows])
         arguments = [configuration.fields, configuration.near, self._rows, epsilon]
-        launch(_make_forces(self.space), n, [*arguments, forces.internal, forces.dissipation], self.device)
+        self._launch(_make_forces(self.space), n, [*arguments, forces.internal, forces.dissipation])

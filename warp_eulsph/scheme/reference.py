@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..execution import launch, simd
+from ..execution import Launcher, simd
 from ..fields import allocate, neighbour_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
 from ..operators.correction import make_correct, make_pair_sums, make_pair_sums_simd
@@ -170,7 +170,7 @@ class Configuration:
     def __init__(self, space: Space, weight: Weight, particles: Any, box: Any, device: Any):
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
-        self.simd = simd(device)
+        self.simd, self._launch = simd(device), Launcher(device)
         self.fields = allocate(space, "Reference", n, device)
         self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device)
         self.K = wp.zeros(n, dtype=space.mat, device=device)
@@ -186,11 +186,11 @@ class Configuration:
     def refresh(self, state: Any) -> None:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
         n = len(state.x)
-        launch(_make_adopt(self.space), n, [state, self.particles, self.fields], self.device)
+        self._launch(_make_adopt(self.space), n, [state, self.particles, self.fields])
         self.lists.build(self.fields.x)
         pair_sums = (make_pair_sums_simd if self.simd else make_pair_sums)(self.weight, self.space)
-        launch(pair_sums, n, [self.particles, self.fields, self.near, self.K], self.device)
-        launch(make_correct(self.space), n, [self.K, self.fields, self.poor], self.device)
+        self._launch(pair_sums, n, [self.particles, self.fields, self.near, self.K])
+        self._launch(make_correct(self.space), n, [self.K, self.fields, self.poor])
         for interpolation in self._interpolations.values():
             interpolation.refresh()
 
@@ -205,11 +205,11 @@ class Configuration:
     def gradient(self, f: wp.array, out: wp.array) -> None:
         """``out`` ← ∇_k f, the corrected gradient (M4) of rows ``f`` of c reals, (n,) of c × dim reals."""
         kernel = make_gradient(self.space, wp.types.type_size(f.dtype), self.simd)
-        launch(kernel, len(f), [self.fields, self.near, f, out], self.device)
+        self._launch(kernel, len(f), [self.fields, self.near, f, out])
 
     def divergence(self, Pi: wp.array, out: wp.array) -> None:
         """``out`` ← −T, the dual divergence (M5) of Π = Q Lᵀ, (n,) of vec."""
-        launch(make_divergence(self.space, self.simd), len(out), [self.fields, self.near, Pi, out], self.device)
+        self._launch(make_divergence(self.space, self.simd), len(out), [self.fields, self.near, Pi, out])
 
     def defect(self, surface: wp.array, out: wp.array) -> None:
         """``out`` ← e_a − s_a [m^(d−1)], (n,) of vec, for surface vectors s_a (M10).
@@ -218,7 +218,7 @@ class Configuration:
         asked for before positions are balanced (M13), as long as L is symmetric.
         """
         self.divergence(self.fields.L, out)
-        launch(_make_defect(self.space), len(out), [surface, out], self.device)
+        self._launch(_make_defect(self.space), len(out), [surface, out])
 
     def nearest(self) -> np.ndarray:
         """Distance of each particle to its nearest neighbour [m], (n,), inf without one; reads the device."""

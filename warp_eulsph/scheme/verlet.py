@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 
 import warp as wp
 
-from ..execution import launch
 from ..space import Space
 from .balance import Balance
 from .dissipation import Upwind
@@ -79,7 +78,7 @@ class VerletStepper(LaxWendroffStepper):
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
         self.flux.carry(U.F)  # fluids keep J only
-        check(self.space, U, self.clock.fields, self.device)
+        check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
         self.steps += 1
@@ -88,4 +87,4 @@ class VerletStepper(LaxWendroffStepper):
         wp.copy(half.v, U.v)
 
     def _finish_mean(self, U: Any, half: Any) -> None:
-        launch(_make_mean(self.space), self.n, [U.v, half.v], self.device)
+        self._launch(_make_mean(self.space), self.n, [U.v, half.v])
