@@ -52,7 +52,7 @@ def test_balance_keeps_linear_fields_duality_and_both_momenta(dim, dtype):
     reference, rng = simulation.stepper.configuration.fields, np.random.default_rng(1)
     x, V = reference.x.numpy().astype(float), reference.V.numpy().astype(float)
     moved = np.abs(reference.balanced.numpy() - x).max() * COUNT[dim]
-    assert 0.01 < moved <= 0.1 * (1.0 + 1e-6)  # something was balanced, and not beyond the bound
+    assert 0.01 < moved <= 0.25 * (1.0 + 1e-6)  # something was balanced, and not beyond the bound
     exact = 1e3 * np.finfo(simulation.space.numpy).eps
     slope = rng.normal(size=(dim, dim))
     assert np.abs(gradient(simulation, x @ slope.T + 2.0) - slope).max() < exact
@@ -69,7 +69,7 @@ def test_balance_keeps_linear_fields_duality_and_both_momenta(dim, dtype):
 
 @pytest.mark.parametrize("dim", [1, 2, 3])
 def test_balance_takes_the_short_waves_of_the_defect(dim):
-    """The force of a uniform stress on particles that pair up along x: less than a tenth of that without balance."""
+    """The force of a uniform stress on particles that pair up along x: 1e-4 of that without balance."""
     n = 8
     x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
     pairing = 0.05 / n * (-1.0) ** np.rint(x[:, :1] * n - 0.5) * np.eye(dim)[0]
@@ -84,7 +84,7 @@ def test_balance_takes_the_short_waves_of_the_defect(dim):
         stepper.stabiliser.refresh(stepper.configuration, stepper.U)
         size[correction] = np.linalg.norm(dual_forces(simulation, np.broadcast_to(np.eye(dim), (len(x), dim, dim))))
     assert size[None] > 1e-6
-    assert size[es.Balance()] < 0.1 * size[None]
+    assert size[es.Balance()] < 1e-4 * size[None]
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])

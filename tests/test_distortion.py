@@ -8,7 +8,7 @@ import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-from warp_eulsph.validation import distortion_map
+from warp_eulsph.validation import distortion_map, distortion_problems
 from warp_eulsph.validation.cases import drop, kinematic_vortex, shear, vortex
 
 POINTS = box((0.55, 0.35), (0.95, 0.75), 0.1)[0]  # radii from 0.72 m to 1.13 m
@@ -150,9 +150,11 @@ def test_map_tells_accurate_from_failed_and_writes_its_files(tmp_path):
 
     def start(n, reference):
         options = {"time_step": es.TimeStep(fixed=2e-2)} if isinstance(reference, es.Always) else {}
-        return distortion_map.start_shear(n, reference, **options)
+        return distortion_problems.start_shear(n, reference, **options)
 
-    problem = replace(distortion_map.PROBLEMS[0], levels=(12,), marks={0.2: 0.02, 0.5: 0.05, 3.0: 0.3}, start=start)
+    problem = replace(
+        distortion_problems.PROBLEMS[0], levels=(12,), marks={0.2: 0.02, 0.5: 0.05, 3.0: 0.3}, start=start
+    )
     verdicts = list(distortion_map.judge(problem, "always", 12))
     assert verdicts[-1].verdict == "failed" and verdicts[-1].reason and verdicts[-1].error is None
     problem = replace(problem, marks={0.2: 0.02, 0.5: 0.05})

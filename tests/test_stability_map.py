@@ -146,13 +146,24 @@ def test_closed_pair_areas_keep_strained_lattices(dim, across, strain):
         assert growth(plain, 200) == pytest.approx(rate, rel=0.1)  # few waves share the largest rate
 
 
+@pytest.mark.parametrize("dilation", [1.2, 1.3, 1.5])
 @pytest.mark.parametrize("strain", [-0.1, 0.1])
-@pytest.mark.parametrize(("dim", "across"), [(1, 16), (2, 8)])
-def test_balanced_pairs_take_most_of_the_growth_away(dim, across, strain):
-    """The default, M13: less than a tenth of what M5 alone grows by; docs/stability.md says what is left."""
-    point = Point(dim=dim, across=across, strain=strain, reference=es.Always())
-    plain = spectral_radius(replace(point, scheme=Verlet(correction=None))) - 1.0
-    assert spectral_radius(point) - 1.0 <= max(0.1 * plain, RESOLVED)
+@pytest.mark.parametrize(("dim", "across"), [(1, 16), (2, 8), (3, 8)])
+def test_balanced_pairs_do_not_grow(dim, across, strain, dilation):
+    """The default, M13, holds strained lattices in tension and compression, where M5 alone pairs particles up."""
+    if dim == 3 and dilation != 1.3:
+        pytest.skip("the map's command measures the other dilations in 3-D")
+    point = Point(dim=dim, across=across, strain=strain, dilation=dilation, reference=es.Always())
+    assert spectral_radius(point) <= 1.0 + RESOLVED
+    if strain > 0.0:
+        assert spectral_radius(replace(point, scheme=Verlet(correction=None))) > 1.05
+
+
+def test_more_iterations_than_needed_do_no_harm():
+    """Conjugate gradients of M11 stop at round-off, also when the right-hand side is nothing else."""
+    closed = Verlet(correction=es.PairAreas(kappa=math.inf, iterations=100))
+    point = Point(dim=3, across=6, strain=-0.03, reference=es.Always(), scheme=closed)
+    assert spectral_radius(point) <= 1.0 + RESOLVED
 
 
 def test_lattices_keep_their_dilation_under_strain():

@@ -45,6 +45,7 @@ from .scheme.limiter import FluxCorrectedTransport
 from .scheme.pair_areas import PairAreas
 from .scheme.reference import Always, Every, Never, ReferencePolicy, WhenDistorted
 from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
+from .scheme.shifting import Shifting
 from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.time_step import TimeStep
@@ -91,6 +92,7 @@ __all__ = [
     "SaintVenantKirchhoff",
     "Sensor",
     "Shepard",
+    "Shifting",
     "Simulation",
     "Smoothing",
     "Space",

@@ -62,7 +62,8 @@ def safe_ratio(space: Space) -> Any:
 def _make_advance(space: Space, start: bool) -> Any:
     """Kernel: x and residual along the search direction (or the first residual), preconditioned residual.
 
-    At the start ``Ap`` becomes the scale of the right-hand side, r∘r/diagonal, which a warm start does not shrink.
+    At the start ``Ap`` becomes what round-off is measured against: the right-hand side, r∘r/diagonal, which a warm
+    start does not shrink, and the terms of the sums it came from, diagonal · h each, which it may be the rest of.
     """
     real, vec, dim = space.real, space.vec, space.dim
     roundoff = float(np.finfo(space.numpy).eps) ** 2
@@ -74,6 +75,7 @@ def _make_advance(space: Space, start: bool) -> Any:
         scale: wp.array(dtype=vec),
         rz: wp.array(dtype=vec),
         pAp: wp.array(dtype=vec),
+        h: wp.array(dtype=real),
         diagonal: wp.array(dtype=real),
         Ap: wp.array(dtype=vec),
         p: wp.array(dtype=vec),
@@ -88,7 +90,8 @@ def _make_advance(space: Space, start: bool) -> Any:
             r[a] = r[a] - Ap[a]
             Ap[a] = vec()
             if diagonal[a] > real(0.0):
-                Ap[a] = wp.cw_mul(rhs, rhs) / diagonal[a]
+                terms = vec(diagonal[a] * h[a])
+                Ap[a] = (wp.cw_mul(rhs, rhs) + wp.cw_mul(terms, terms)) / diagonal[a]
         else:
             alpha = ratio(rz[0], pAp[0])
             for i in range(wp.static(dim)):
@@ -147,13 +150,13 @@ class LaplacianSolver:
         """
         own = slice(body.start, body.stop)
         self._apply(reference, near, body, self.psi)
-        self._advance(body, start=True)
-        self._sum(self._Ap[own], self._scale)  # of the right-hand side: what round-off is measured against
+        self._advance(reference, body, start=True)
+        self._sum(self._Ap[own], self._scale)
         self._sum(self._product[own], self._rz)
         for _ in range(iterations):
             self._apply(reference, near, body, self._p)
             self._sum(self._product[own], self._pAp)
-            self._advance(body, start=False)
+            self._advance(reference, body, start=False)
             self._rz, self._rz_old = self._rz_old, self._rz
             self._sum(self._product[own], self._rz)
             turn = [body.start, self._rz, self._rz_old, self._z, self._p]
@@ -163,8 +166,8 @@ class LaplacianSolver:
         arguments = [body.start, reference, near, f, self._Ap, self._diagonal, self._product]
         wp.launch(_make_apply(self.space), len(body), arguments, device=self.device)
 
-    def _advance(self, body: range, start: bool) -> None:
+    def _advance(self, reference: Any, body: range, start: bool) -> None:
         scalars = [self._scale, self._rz, self._pAp]
         vectors = [self._Ap, self._p, self.psi, self.residual, self._z, self._product]
-        arguments = [body.start, *scalars, self._diagonal, *vectors]
+        arguments = [body.start, *scalars, reference.h, self._diagonal, *vectors]
         wp.launch(_make_advance(self.space, start), len(body), arguments, device=self.device)

@@ -30,6 +30,7 @@ class Lax:
     dissipation: Upwind | None = Upwind()
     correction: Any = Balance()
     limiter: ClassVar[None] = None
+    shifting: ClassVar[None] = None
     cfl: ClassVar[float] = 0.4
 
     def build(self, *parts: Any) -> "LaxStepper":

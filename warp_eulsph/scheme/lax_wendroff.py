@@ -20,6 +20,7 @@ from .ledger import Ledger
 from .limiter import FluxCorrectedTransport, MassDiffusion
 from .reference import Configuration, ReferencePolicy
 from .sensor import SensorField
+from .shifting import Shifter, Shifting
 from .smoothing import Smoothing
 from .stabiliser import Stabiliser
 from .time_step import DeviceClock
@@ -37,18 +38,29 @@ class LaxWendroff:
             M12); None is the plain dual form, which pairs up in tension. Not used with a fixed reference, where it is
             zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
+        shifting: what keeps the arrangement even in a moving reference (M15), with Balance() only; None shifts nothing.
     """
 
     smoothing: Smoothing | None = None
     dissipation: Upwind | None = Upwind()
     correction: Any = Balance()
     limiter: FluxCorrectedTransport | None = None
+    shifting: Shifting | None = None
     #: Tested Courant number; the limit is 0.5 in bounded 3-D bodies.
     cfl: ClassVar[float] = 0.4
+
+    def __post_init__(self) -> None:
+        check_shifting(self.shifting, self.correction)
 
     def build(self, *parts: Any) -> "LaxWendroffStepper":
         """The scheme at work; ``parts`` are the arguments of the stepper after its options."""
         return LaxWendroffStepper(self, *parts)
+
+
+def check_shifting(shifting: Shifting | None, correction: Any) -> None:
+    """Raise ValueError unless the correction has the potentials that shifting follows."""
+    if shifting is not None and not isinstance(correction, Balance):
+        raise ValueError(f"shifting needs correction=Balance(), whose potentials it follows, got {correction}")
 
 
 @functools.cache
@@ -158,8 +170,11 @@ class LaxWendroffStepper:
         self.policy, self.clock, self.conditions = policy, clock, conditions
         self.forces = allocate(space, "Forces", n, device)
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
+        self.shifter: Shifter | None = None
+        if options.shifting is not None and not policy.fixed:
+            self.shifter = options.shifting.build(space, particles, flux, conditions, device)
         smoothing = options.smoothing
-        needed = n if smoothing is not None and smoothing.needs_gradient else 0
+        needed = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(needed, dtype=space.row_gradient(space.dim**2), device=device)
         self.steps = 0
         self.stabiliser: Stabiliser = UpwindForces(space, device)
@@ -212,8 +227,18 @@ class LaxWendroffStepper:
 
     def _refresh_if_due(self, U: Any) -> None:
         if self.steps and self.policy.due(self.steps, self.configuration, U.F):
+            self._shift(U)  # M15
             self.configuration.refresh(U)
             self._after_refresh()
+
+    def _shift(self, U: Any) -> None:
+        if self.shifter is not None:
+            reference, psi = self.configuration.fields, self.stabiliser.psi
+            self._velocity_gradient(U)
+            self.configuration.gradient(self._rows(U.F), self.grad_F)
+            self.shifter.apply(reference, psi, U, self.grad_v, self.grad_F, self.clock.fields)
+            self._impose(U, 0.0)
+            self.ledger.book_shift(U)
 
     def _after_refresh(self) -> None:
         self.stabiliser.refresh(self.configuration, self.U)

@@ -15,7 +15,7 @@ from .reference import Configuration
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "correction", "limiter", "stepping")
+ACCOUNTS = ("external", "constraint", "dissipation", "correction", "limiter", "stepping", "shifting")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
@@ -78,6 +78,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
             dt * wp.dot(precise(forces.correction[a]), v_mean),
             limiter,
             stepping,
+            wide(0.0),
         )
         if dt > wide(0.0):
             forces.reaction[a] = vec(impulse / dt)
@@ -85,6 +86,34 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
         W_old[a] = W[a]
 
     return entries
+
+
+@functools.cache
+def _make_shift_entry(space: Space) -> Any:
+    """Kernel: kinetic and stored energy that a particle gained since the last entry, all of it by shifting (M15)."""
+    vec, Particles, State, wide = space.vec, structure(space, "Particles"), structure(space, "State"), wp.float64
+    precise = wp.types.vector(length=space.dim, dtype=wp.float64)
+    last = len(ACCOUNTS) - 1
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def shift_entry(
+        particles: Particles,
+        state: State,
+        v_old: wp.array(dtype=vec),
+        W_old: wp.array(dtype=wide),
+        W: wp.array(dtype=wide),
+        out: wp.array(dtype=_Entry),
+    ):
+        a = wp.tid()
+        v, before = precise(state.v[a]), precise(v_old[a])
+        gain = wide(0.5) * wide(particles.mass[a]) * wp.dot(v - before, v + before) + W[a] - W_old[a]
+        entry = _Entry()
+        entry[last] = wide(particles.share[a]) * gain
+        out[a] = entry
+        v_old[a] = state.v[a]
+        W_old[a] = W[a]
+
+    return shift_entry
 
 
 @functools.cache
@@ -192,6 +221,16 @@ class Ledger:
         arguments += [self.clock.fields, forces, self._entries]
         kernel = _make_entries(self.space, self.limiter is not None, smoothed is not None)
         self._launch(kernel, len(self._W), arguments)
+        self._book()
+
+    def book_shift(self, U: Any) -> None:
+        """Book what shifting did to ``U`` since the last step."""
+        self.flux.energy(U.F, self._W)
+        arguments = [self.particles, U, self._v_old, self._W_old, self._W, self._entries]
+        wp.launch(_make_shift_entry(self.space), len(self._W), arguments, device=self.device)
+        self._book()
+
+    def _book(self) -> None:
         self._sum_entries(self._entries, self._step)
         self._launch.once(_make_book(), 1, [self._step, self._total])
 

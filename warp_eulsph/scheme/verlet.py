@@ -10,8 +10,9 @@ from ..space import Space
 from .balance import Balance
 from .dissipation import Upwind
 from .health import check
-from .lax_wendroff import LaxWendroffStepper
+from .lax_wendroff import LaxWendroffStepper, check_shifting
 from .limiter import FluxCorrectedTransport
+from .shifting import Shifting
 
 
 @dataclass(frozen=True)
@@ -27,14 +28,19 @@ class Verlet:
             M12); None is the plain dual form, which pairs up in tension. Not used with a fixed reference, where it is
             zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
+        shifting: what keeps the arrangement even in a moving reference (M15), with Balance() only; None shifts nothing.
     """
 
     dissipation: Upwind | None = Upwind()
     correction: Any = Balance()
     limiter: FluxCorrectedTransport | None = None
+    shifting: Shifting | None = None
     smoothing: ClassVar[None] = None
     #: Tested Courant number; the limit is 1.1 to 1.3 in bounded 3-D bodies.
     cfl: ClassVar[float] = 0.8
+
+    def __post_init__(self) -> None:
+        check_shifting(self.shifting, self.correction)
 
     def build(self, *parts: Any) -> "VerletStepper":
         """The scheme at work; ``parts`` are the arguments of the stepper after its options."""

@@ -12,7 +12,7 @@ import argparse
 import csv
 import logging
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -26,15 +26,14 @@ from .. import (
     Never,
     PairAreas,
     ReferencePolicy,
+    Shifting,
     Simulation,
     SurfaceVectors,
     UnstableError,
     Verlet,
     WhenDistorted,
 )
-from .cases import punch, shear, spinning_plate, vortex
-from .history import at, series
-from .solids import MaterialPoint
+from .distortion_problems import PROBLEMS, Problem
 
 _log = logging.getLogger(__name__)
 
@@ -53,43 +52,11 @@ REFERENCES: dict[str, tuple[ReferencePolicy, dict[str, Any]]] = {
     "every 2": (Every(2), {}),
     "criterion": (WhenDistorted(1.2), {}),
     "always": (Always(), {}),
+    "always, shifted": (Always(), {"scheme": Verlet(shifting=Shifting())}),
     "always, M11": (Always(), {"scheme": Verlet(correction=PairAreas(kappa=math.inf))}),
     "always, M10": (Always(), {"scheme": Verlet(correction=SurfaceVectors())}),
 }
 QUICK = ("never", "every 10", "always")
-
-
-@dataclass(frozen=True)
-class Run:
-    """A simulation and how it is judged: ``error()`` [-] is asked at every frame, None where there is no reference."""
-
-    simulation: Simulation
-    error: Callable[[], float | None]
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A problem with a growing distortion.
-
-    Args:
-        name: of the problem.
-        distortion: what grows, with its unit.
-        error: what the error is.
-        levels: resolutions, coarse first.
-        marks: distortion -> time [s] at which it is reached.
-        frame: time between two looks [s].
-        start: (level, reference, options) -> Run.
-        options: whether ``start`` takes options of the simulation.
-    """
-
-    name: str
-    distortion: str
-    error: str
-    levels: Sequence[int]
-    marks: dict[float, float]
-    frame: float
-    start: Callable[..., Run]
-    options: bool = True
 
 
 @dataclass(frozen=True)
@@ -104,109 +71,6 @@ class Verdict:
     error: float | None
     reason: str
     steps: int
-
-
-AMPLITUDE = 0.5
-
-
-def start_vortex(rings: int, reference: ReferencePolicy, **options: Any) -> Run:
-    """The vortex at half its full amplitude: a shear of 11 at t = ½ s."""
-    simulation = vortex.build(rings, reference, AMPLITUDE, **options)
-    X, volume = simulation.bodies[0].x, simulation.bodies[0].volume
-
-    def error() -> float:
-        F = vortex.exact(X, simulation.t, AMPLITUDE)[2]
-        wrong, right = (volume @ np.square(G).sum(axis=(1, 2)) for G in (simulation.F - F, F - np.eye(2)))
-        return math.sqrt(wrong / right)
-
-    return Run(simulation, error)
-
-
-def start_shear(n: int, reference: ReferencePolicy, **options: Any) -> Run:
-    """The block in simple shear."""
-    simulation, upper = shear.build(n, reference, **options)
-
-    def error() -> float:
-        now = shear.errors(simulation, upper)
-        return max(now["F"], now["stress"])
-
-    return Run(simulation, error)
-
-
-def start_punch(n: int, reference: ReferencePolicy) -> Run:
-    """The punched block; its reference gives reactions until 15 ms."""
-    simulation, condition = punch.build(n, reference)
-    seen: dict[float, float] = {}
-
-    def error() -> float | None:
-        seen[simulation.t] = -1e-6 * simulation.reaction(condition)[1]
-        for time, bounds in punch.REACTIONS.items():
-            if abs(simulation.t - time) < 1e-6:
-                # mean over the half millisecond before: single steps ring
-                recent = [reaction for t, reaction in seen.items() if time - 0.5e-3 < t <= time]
-                return abs(float(np.mean(recent)) / (0.5 * sum(bounds)) - 1.0)
-        return None
-
-    return Run(simulation, error)
-
-
-def start_plate(n: int, reference: ReferencePolicy) -> Run:
-    """The spinning plate; its reference goes to 0.15 s."""
-    simulation, exact = spinning_plate.build(n, reference), series(spinning_plate.SERIES)
-    corner, wrong, right = MaterialPoint(simulation, np.array([0.5, 0.5])), [], []
-
-    def error() -> float:
-        right.append(at(exact, "Rcorner", simulation.t))
-        wrong.append(float(np.linalg.norm(corner.x)) - right[-1])
-        return math.sqrt(np.mean(np.square(wrong))) / max(np.ptp(right), 1e-12)
-
-    return Run(simulation, error)
-
-
-def _time_of_shear(gamma: float) -> float:
-    return math.asin(min(gamma / vortex.largest_shear(AMPLITUDE), 1.0)) / math.pi
-
-
-PROBLEMS = (
-    Problem(
-        "shear",
-        "shear",
-        "of F or stress",
-        (12, 24),
-        {gamma: gamma / shear.RATE for gamma in (0.5, 1.0, 2.0, 5.0, 8.0)},
-        0.01,
-        start_shear,
-    ),
-    Problem(
-        "vortex",
-        "largest shear",
-        "of F, L2",
-        (8, 16),
-        {gamma: _time_of_shear(gamma) for gamma in (1.0, 2.0, 4.0, 6.0, 8.0, 11.0)},
-        0.01,
-        start_vortex,
-    ),
-    Problem(
-        "punch",
-        "depth [%]",
-        "of the reaction",
-        (20, 40),
-        {4.0: 0.005, 9.0: 0.010, 14.0: 0.015, 19.0: 0.020, 24.0: 0.025, 29.0: 0.030},
-        1e-4,
-        start_punch,
-        options=False,
-    ),
-    Problem(
-        "spinning plate",
-        "turns of 60 ms",
-        "of the corner's radius, rms / range",
-        (16, 32),
-        {turns: turns * 2.0 * math.pi / spinning_plate.SPIN for turns in (0.25, 0.5, 1.0, 2.0, 2.5)},
-        5e-4,
-        start_plate,
-        options=False,
-    ),
-)
 
 
 def judge(problem: Problem, name: str, level: int) -> Iterator[Verdict]:
@@ -264,8 +128,6 @@ def run(problems: Sequence[Problem], names: Sequence[str], quick: bool, output: 
     for problem in problems:
         for level in problem.levels[:1] if quick else problem.levels:
             for name in names:
-                if REFERENCES[name][1] and not problem.options:
-                    continue
                 row = list(judge(problem, name, level))
                 verdicts += row
                 shown = ", ".join(f"{v.distortion:g}: {v.verdict} {_percent(v.error)} {v.reason}" for v in row)

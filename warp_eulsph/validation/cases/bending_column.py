@@ -22,7 +22,7 @@ FIRST_SWING, THREE_SWINGS = 0.55, 2.6  # s; soft columns swing slower than the r
 SERIES = "bendY_2"
 
 
-def build(dim: int, n: int, reference: ReferencePolicy) -> Simulation:
+def build(dim: int, n: int, reference: ReferencePolicy, **options: Any) -> Simulation:
     """The column, n particles across; the lowest layer is held. In 2-D Poisson's ratio is 0.3."""
     spacing = 1.0 / n
     x, volume = box((-0.5, 0.0, -0.5)[:dim], (0.5, HEIGHT, 0.5)[:dim], spacing)
@@ -30,7 +30,7 @@ def build(dim: int, n: int, reference: ReferencePolicy) -> Simulation:
     velocity[:, 0] = 10.0 * x[:, 1] / HEIGHT
     material = RUBBER if dim == 3 else NeoHookean(density=RUBBER.density, young=RUBBER.young, poisson=0.3)
     body = Body(x=x, volume=volume, material=material, velocity=velocity)
-    return Simulation(body, boundaries=[Fixed(lambda X: X[:, 1] < spacing)], reference=reference)
+    return Simulation(body, boundaries=[Fixed(lambda X: X[:, 1] < spacing)], reference=reference, **options)
 
 
 def measure(simulation: Simulation, until: float, writer: Any = None) -> History:

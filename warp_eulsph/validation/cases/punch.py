@@ -34,7 +34,7 @@ def punch_velocity(x: wp.vec2d, t: wp.float64):
     return wp.vec2d(wp.float64(0.0), wp.float64(-10.0) * s * s * (wp.float64(3.0) - wp.float64(2.0) * s))
 
 
-def build(n: int, reference: ReferencePolicy) -> tuple[Simulation, Velocity]:
+def build(n: int, reference: ReferencePolicy, **options: Any) -> tuple[Simulation, Velocity]:
     """The block as n × n particles, and the condition of the punch."""
     dx = 1.0 / n
     x, volume = box((0.0, 0.0), (1.0, 1.0), dx)
@@ -44,7 +44,7 @@ def build(n: int, reference: ReferencePolicy) -> tuple[Simulation, Velocity]:
         Fixed(lambda X: X[:, 1] < dx, axes=(1,)),
     ]
     block = Body(x=x, volume=volume, material=RUBBER)
-    return Simulation(block, boundaries=[*rollers, punch], reference=reference), punch
+    return Simulation(block, boundaries=[*rollers, punch], reference=reference, **options), punch
 
 
 def measure(simulation: Simulation, punch: Velocity, until: float = END_TIME, writer: Any = None) -> History:
