@@ -179,8 +179,9 @@ class NeighbourLists:
         wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
         pairs = self.pairs
         if pairs > self.capacity:
-            # A quarter more than needed, so that a moving reference grows its lists seldom.
-            self._reserve(pairs + pairs // 4)
+            # Exactly what the first configuration needs, which may be the only one; then a quarter more than needed, so
+            # that a moving reference grows its lists seldom.
+            self._reserve(pairs + (pairs // 4 if self.capacity else 0))
             log.debug("neighbour lists grew to %d pairs", self.capacity)
         self._search(x, scratch, fill=True)
 
