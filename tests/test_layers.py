@@ -12,12 +12,12 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg"},
+    {"space", "linalg", "execution", "atomics", "simd"},
     {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
     {"simulation", "diagnostics", "output", "geometry"},
-    {"validation", "pictures"},
+    {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},
 ]
@@ -25,7 +25,8 @@ LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 # The front door shows rooms up to the simulation: those above may come in by it.
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
-FRONT_ENDS = {"validation/command.py", "validation/step_cost.py"}  # what the command line prints is its result
+# What the command line prints is its result
+FRONT_ENDS = {"bench/command.py", "validation/command.py", "validation/step_cost.py"}
 FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 
 

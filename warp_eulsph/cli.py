@@ -3,10 +3,10 @@
 import argparse
 from collections.abc import Sequence
 
-from .commands import check, export, info, plot, resume, run, schema, validate
+from .commands import bench, check, export, info, plot, resume, run, schema, validate
 
 # Each imports what it needs when it runs, so that asking for help is quick.
-COMMANDS = (run, resume, info, check, plot, export, schema, validate)
+COMMANDS = (run, resume, info, check, plot, export, schema, validate, bench)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

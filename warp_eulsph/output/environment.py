@@ -3,6 +3,7 @@
 import platform
 from typing import Any
 
+from ..execution import simd
 from ..simulation import Simulation
 
 
@@ -17,6 +18,7 @@ def environment(simulation: Simulation) -> dict[str, Any]:
             **{name: metadata.version(name) for name in ("warp-eulsph", "warp-lang", "numpy", "h5py")},
         },
         "device": {"name": device.name or platform.processor(), "kind": "cuda" if device.is_cuda else "cpu"},
+        "simd": simd(device),  # SIMD kernels differ from the portable ones by round-off
         "machine": {"system": platform.system(), "architecture": platform.machine()},
         "dtype": simulation.space.real.__name__,
     }
