@@ -73,7 +73,8 @@ def reachable(simulation):
             arrays[path] = value
         elif isinstance(value, dict):
             for key, item in value.items():
-                walk(item, f"{path}.{key}")
+                if not isinstance(key, tuple):  # recorded launches: their arrays belong to others
+                    walk(item, f"{path}.{key}")
         elif isinstance(value, list | tuple):
             for i, item in enumerate(value):
                 walk(item, f"{path}.{i}")
