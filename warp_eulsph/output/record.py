@@ -94,6 +94,8 @@ def record(
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
         measures = [probe.bind(simulation) for probe in recording.probes]  # wrong ones are told before files move
+        if resume and checkpoint is None and home.holds_a_run:
+            log.warning("%s has no checkpoint: the run starts anew, what is there moves to abandoned", home.path)
         if checkpoint is None:
             _begin(home, simulation, replace=replace or resume)
         else:

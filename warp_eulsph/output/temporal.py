@@ -17,7 +17,7 @@ _KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 def write_index(path: Path, entries: Sequence[Entry]) -> None:
     """Write ``path``, an index of the snapshots ``entries`` beside it, for ParaView (5.12 or newer) and VTK (9.3).
 
-    Fields are those that all snapshots have. A snapshot that is lost later reads as not-a-number.
+    Fields are those of the last snapshot; where one has no such field, or is lost later, it reads as not-a-number.
 
     Args:
         path: of the index, in the run's directory.
