@@ -85,7 +85,7 @@ def test_same_particles_and_first_steps_as_in_python(name):
 
 
 def test_drop_of_a_relaxed_disc_follows_the_exact_one():
-    """The validation's bands for semi-axes and positions; the cut lattice misses that of the positions."""
+    """Within the validation's bands, 0.3 %; positions of the cut lattice are not."""
     errors = []
     for overrides in ([], ["body.drop.shape.relaxation=None"]):
         case = read_case(CASES / "drop.toml", overrides)
@@ -94,7 +94,7 @@ def test_drop_of_a_relaxed_disc_follows_the_exact_one():
         errors.append(drop.errors(simulation))
     for found in errors:
         assert max(abs(found["A"]), abs(found["B"]), abs(found["volume"])) < 0.003 and 0.999 < found["energy"] <= 1.0001
-    assert errors[0]["x"] < 0.003 < errors[1]["x"]
+    assert errors[0]["x"] < 0.002 and errors[1]["x"] > 0.003
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -538,7 +538,8 @@ def test_2000_fuzzed_files_give_one_named_error_each(tmp_path):
         assert read_or_named(tmp_path / "case.toml") is None
 
 
-def test_500_mutated_files_are_valid_or_named(tmp_path):
+def test_500_mutated_files_are_valid_or_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("warp_eulsph.geometry.lattice.MOST_PARTICLES", 20_000)  # a digit more is not worth the time
     random = np.random.default_rng(2)
     valid = 0
     for k in range(500):

@@ -17,19 +17,20 @@ class Relaxation:
     """Particles repel each other and their mirror images in the surface, so that they come to lie evenly.
 
     Each sweep moves x_a by gain · s Σ_b (1 − r/2s)³ (x_a − x_b)/r, at most a tenth of the spacing s, over particles and
-    images within 2 s. The outermost settle about half a spacing beneath the surface.
+    images within 2 s. The outermost settle about half a spacing beneath the surface. Evenness over a few spacings
+    comes first, over the whole shape last.
 
     Args:
         sweeps: how often particles move.
         gain: how far, over a spacing.
     """
 
-    sweeps: int = 100
+    sweeps: int = 200
     gain: float = 0.1
 
     def __post_init__(self) -> None:
-        if self.sweeps < 1:
-            raise ValueError(f"sweeps must be at least 1, got {self.sweeps}; leave the relaxation out for none")
+        if not 1 <= self.sweeps <= 10_000:
+            raise ValueError(f"sweeps must be in [1, 10000], got {self.sweeps}; leave the relaxation out for none")
         if not 0.0 < self.gain <= 0.2:
             raise ValueError(f"gain must be in (0, 0.2], got {self.gain}; 0.1 is the tested value")
 
