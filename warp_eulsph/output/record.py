@@ -161,6 +161,7 @@ class _Recorder:
         resume: bool,
     ):
         self.home, self.simulation, self.recording, self.resumed = home, simulation, recording, resume
+        self.schedule = recording.schedule
         tables = [Table(home.probes / probe.name, probe.units) for probe in recording.probes]
         self.probes = list(zip(recording.probes, measures, tables, strict=True))
         self.snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, resume=True)
@@ -213,7 +214,7 @@ class _Recorder:
         return Outcome(simulation.t, simulation.steps, reason if state == "stopped" else None)
 
     def _advance(self, until: float) -> None:
-        schedule, simulation = self.recording.schedule, self.simulation
+        simulation, schedule = self.simulation, self.schedule
         target = next_target(schedule, simulation.t, until)
         simulation.advance(target, schedule.steps_left(simulation.steps))
 
