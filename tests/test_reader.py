@@ -208,6 +208,18 @@ def test_vtk_reads_an_index_over_changing_numbers_of_particles(tmp_path):
         np.testing.assert_array_equal(vtk_to_numpy(data.GetPointData().GetArray("velocity")), pad(frame.v))
 
 
+def test_pyvista_reads_the_series_with_its_times(directory):
+    import pyvista
+
+    reader, run = pyvista.get_reader(str(directory / "run.vtkhdf.series")), Run(directory)
+    assert list(reader.time_values) == run.times.tolist()
+    for k, frame in enumerate(run):
+        reader.set_active_time_point(k)
+        data = reader.read()
+        np.testing.assert_array_equal(data.points, pad(frame.x))
+        np.testing.assert_array_equal(data.point_data["pressure"], frame.pressure)
+
+
 def test_lost_snapshot_reads_as_not_a_number(directory, tmp_path):
     import shutil
 
