@@ -105,7 +105,7 @@ def table_of(target: Callable[..., Any], sole: bool = False) -> type[Options]:
         if default is inspect.Parameter.empty:
             fields[name] = (kind, Field(description=described.get(name)))
         else:
-            given = "None" if default is None and _may_be_nothing(kind) else _given(default)
+            given: Any = "None" if default is None and _may_be_nothing(kind) else _given(default)
             fields[name] = (kind, Field(given, validate_default=given is not None, description=described.get(name)))
     kind_name = target.__name__
     fields = {"kind": (Literal[kind_name], kind_name if sole else ...), **fields}  # type: ignore[valid-type]
