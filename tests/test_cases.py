@@ -85,7 +85,7 @@ def test_same_particles_and_first_steps_as_in_python(name):
 
 
 def test_drop_of_a_relaxed_disc_follows_the_exact_one():
-    """The validation's bands for semi-axes and positions; the cut lattice misses that of the positions."""
+    """Within the validation's bands, 0.3 %; positions of the cut lattice are not."""
     errors = []
     for overrides in ([], ["body.drop.shape.relaxation=None"]):
         case = read_case(CASES / "drop.toml", overrides)
@@ -94,7 +94,7 @@ def test_drop_of_a_relaxed_disc_follows_the_exact_one():
         errors.append(drop.errors(simulation))
     for found in errors:
         assert max(abs(found["A"]), abs(found["B"]), abs(found["volume"])) < 0.003 and 0.999 < found["energy"] <= 1.0001
-    assert errors[0]["x"] < 0.003 < errors[1]["x"]
+    assert errors[0]["x"] < 0.002 and errors[1]["x"] > 0.003
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -109,12 +109,11 @@ def test_case_files_are_short_and_describe_themselves(file):
 
 
 def test_description_holds_the_defaults():
-    described = parse_case(small()).describe()
-    assert described["scheme"] == {
-        "kind": "Verlet",
-        "dissipation": {"kind": "Upwind", "epsilon": 1.0},
-        "correction": {"kind": "Balance", **vars(es.Balance())},
-    }
+    case = parse_case(small())
+    described = case.describe()
+    assert case.scheme.make() == es.Verlet() and set(described["scheme"]) == {"kind", *vars(es.Verlet())}
+    assert described["scheme"]["dissipation"] == {"kind": "Upwind", "epsilon": 1.0, "sensor": {"kind": "None"}}
+    assert described["scheme"]["correction"] == {"kind": "Balance", **vars(es.Balance())}
     assert described["time_step"]["growth"] == 1.1 and described["dilation"] == 1.3
 
 
@@ -173,6 +172,18 @@ def test_case_of_the_documents_builds_and_its_mistakes_are_as_shown():
         parse_case(tomllib.loads(bad))
     shown = re.search(r"```text\n(case: .*?)\n```", text, re.DOTALL)[1]
     assert str(caught.value) == shown
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_editors_accept_the_case_files_by_the_schema(file):
+    from jsonschema import Draft202012Validator
+
+    validator = Draft202012Validator(json_schema())
+    data = tomllib.loads(file.read_text(encoding="utf-8"))
+    assert not [error.message for error in validator.iter_errors(data)]
+    (body,) = data["body"].values()
+    body["material"]["yuong"] = body["material"].pop("density")
+    assert not validator.is_valid(data)
 
 
 # options and formulas
@@ -538,7 +549,8 @@ def test_2000_fuzzed_files_give_one_named_error_each(tmp_path):
         assert read_or_named(tmp_path / "case.toml") is None
 
 
-def test_500_mutated_files_are_valid_or_named(tmp_path):
+def test_500_mutated_files_are_valid_or_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("warp_eulsph.geometry.lattice.MOST_PARTICLES", 20_000)  # a digit more is not worth the time
     random = np.random.default_rng(2)
     valid = 0
     for k in range(500):

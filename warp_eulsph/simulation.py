@@ -148,14 +148,18 @@ class Simulation:
             UnstableError: det F ≤ 0 or non-finite values.
         """
         self.clock.aim(until)
+        self._take_steps(most)
+
+    def _advance(self, until: float) -> None:
+        self.clock.aim(until)
+        while self.t < until:
+            self._take_steps(None)
+
+    def _take_steps(self, most: int | None) -> None:
         batch = STEPS_BETWEEN_LOOKS if self.device.is_cuda else 1
         for _ in range(batch if most is None else min(batch, most)):
             self.stepper.step()
         self._raise_if_bad()
-
-    def _advance(self, until: float) -> None:
-        while self.t < until:
-            self.advance(until)
 
     # what a checkpoint holds
 

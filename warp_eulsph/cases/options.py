@@ -41,9 +41,7 @@ from .values import Formula, Number, PathText, PlaceTimeFormula, Whole, ZoneForm
 class Table(BaseModel):
     """A table of a case file: no unknown keys, no conversions, no infinities."""
 
-    model_config = ConfigDict(
-        extra="forbid", strict=True, allow_inf_nan=False, frozen=True, arbitrary_types_allowed=True
-    )
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -107,8 +105,8 @@ def table_of(target: Callable[..., Any], sole: bool = False) -> type[Options]:
         if default is inspect.Parameter.empty:
             fields[name] = (kind, Field(description=described.get(name)))
         else:
-            made = _given(default)
-            fields[name] = (kind, Field(default_factory=lambda made=made: made, description=described.get(name)))
+            given: Any = "None" if default is None and _may_be_nothing(kind) else _given(default)
+            fields[name] = (kind, Field(given, validate_default=given is not None, description=described.get(name)))
     kind_name = target.__name__
     fields = {"kind": (Literal[kind_name], kind_name if sole else ...), **fields}  # type: ignore[valid-type]
     model = create_model(kind_name, __base__=Options, __doc__=_summary(target), **fields)
@@ -123,12 +121,21 @@ def _parameters(target: Callable[..., Any]) -> list[inspect.Parameter]:
 
 
 def _given(default: Any) -> Any:
-    """A default as the table holds it."""
+    """A default as a file would give it, or None where a file can only leave it out."""
     if default is None or isinstance(default, (bool, int, float, str)):
         return default
-    arguments = {p.name: _given(getattr(default, p.name)) for p in _parameters(type(default))}
-    target: Any = type(default)
-    return table_of(target).model_construct(kind=target.__name__, **arguments)
+    if isinstance(default, tuple):
+        return list(default)
+    table: dict[str, Any] = {"kind": type(default).__name__}
+    for parameter in _parameters(type(default)):
+        value = getattr(default, parameter.name)
+        if value != parameter.default:  # what is None here switches off what the class itself would have
+            table[parameter.name] = "None" if value is None else _given(value)
+    return table
+
+
+def _may_be_nothing(kind: Any) -> bool:
+    return any(isinstance(note, _Name) and "None" in note.names for note in getattr(kind, "__metadata__", ()))
 
 
 def _written(name: str, hint: Any) -> Any:
@@ -141,25 +148,29 @@ def _written(name: str, hint: Any) -> Any:
         return choice(Balance, SurfaceVectors, PairAreas, optional=True)
     if name == "boundary":
         return Whole  # which of the case's conditions, from 0
+    members = typing.get_args(hint) if typing.get_origin(hint) in (Union, types.UnionType) else (hint,)
+    if PathLike in members:
+        return PathText
+    optional = types.NoneType in members
+    members = tuple(member for member in members if member is not types.NoneType)
+    if all(_of_the_package(member) for member in members):
+        return choice(*members, optional=optional)
+    if len(members) == 1:
+        return _plain(name, members[0]) | None if optional else _plain(name, members[0])
+    raise TypeError(f"{name}: {hint} cannot be written in a case file")
+
+
+def _of_the_package(hint: Any) -> bool:
+    return isinstance(hint, type) and hint.__module__.startswith("warp_eulsph.")
+
+
+def _plain(name: str, hint: Any) -> Any:
+    """How a number, word or list of them is written."""
     plain = {float: Number, int: Whole, bool: bool, str: str}
     if hint in plain:
         return plain[hint]
-    origin, members = typing.get_origin(hint), typing.get_args(hint)
-    if origin is typing.get_origin(Sequence[int]) and members[0] in plain:
-        return list[plain[members[0]]]  # type: ignore[valid-type]
-    if origin in (Union, types.UnionType):
-        if PathLike in members:
-            return PathText
-        others = [member for member in members if member is not types.NoneType]
-        if len(others) < len(members) and len(others) == 1:
-            return (
-                _written(name, others[0]) | None
-                if others[0] in plain or typing.get_origin(others[0])
-                else choice(*others, optional=True)
-            )
-        return choice(*others, optional=len(others) < len(members))
-    if isinstance(hint, type) and hint.__module__.startswith(__package__.split(".")[0]):
-        return choice(hint)
+    if typing.get_origin(hint) is typing.get_origin(Sequence[int]) and typing.get_args(hint)[0] in plain:
+        return list[plain[typing.get_args(hint)[0]]]  # type: ignore[misc]
     raise TypeError(f"{name}: {hint} cannot be written in a case file")
 
 
@@ -175,7 +186,7 @@ def one_of(*targets: Callable[..., Any], optional: bool = False) -> Any:
     """One of these classes or functions."""
     if len(targets) == 1 and not optional:
         return Annotated[table_of(targets[0], sole=True), _Name((targets[0].__name__,))]
-    tables = [table_of(target) for target in targets] + ([Nothing] if optional else [])
+    tables = [table_of(target, sole=len(targets) == 1) for target in targets] + ([Nothing] if optional else [])
     names = tuple(target.__name__ for target in targets) + (("None",) if optional else ())
     sole = targets[0].__name__ if len(targets) == 1 else None
     return Annotated[Union[tuple(tables)], Field(discriminator="kind"), _Name(names, sole)]  # noqa: UP007
@@ -212,7 +223,7 @@ def concrete(base: type) -> list[type]:
         cls = todo.pop()
         todo += cls.__subclasses__()
         # Those of the tests and of a user's own script are not what a case file can name.
-        if cls is not base and cls.__module__.startswith(f"{package.__name__.split('.')[0]}."):
+        if cls is not base and _of_the_package(cls):
             below.add(cls)
     found = [cls for cls in below if not inspect.isabstract(cls)] or [base]
     return sorted(found, key=lambda cls: cls.__name__)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-# Particles repel each other within this many spacings.
-REACH = 2.0
+# Particles repel each other within this many spacings, and stay so many beneath the surface.
+REACH, LEAST_DEPTH = 2.0, 0.25
 
 
 @dataclass(frozen=True)
@@ -17,19 +17,20 @@ class Relaxation:
     """Particles repel each other and their mirror images in the surface, so that they come to lie evenly.
 
     Each sweep moves x_a by gain · s Σ_b (1 − r/2s)³ (x_a − x_b)/r, at most a tenth of the spacing s, over particles and
-    images within 2 s. The outermost settle about half a spacing beneath the surface.
+    images within 2 s. The outermost settle about half a spacing beneath the surface. Evenness over a few spacings
+    comes first, over the whole shape last.
 
     Args:
         sweeps: how often particles move.
         gain: how far, over a spacing.
     """
 
-    sweeps: int = 100
+    sweeps: int = 200
     gain: float = 0.1
 
     def __post_init__(self) -> None:
-        if self.sweeps < 1:
-            raise ValueError(f"sweeps must be at least 1, got {self.sweeps}; leave the relaxation out for none")
+        if not 1 <= self.sweeps <= 10_000:
+            raise ValueError(f"sweeps must be in [1, 10000], got {self.sweeps}; leave the relaxation out for none")
         if not 0.0 < self.gain <= 0.2:
             raise ValueError(f"gain must be in (0, 0.2], got {self.gain}; 0.1 is the tested value")
 
@@ -39,16 +40,26 @@ class Relaxation:
         """Positions [m], (n, dim), from those given; ``depth`` as in ``Solid``. On the host, to the same bits."""
         spacing = volume ** (1.0 / x.shape[1])
         x = x.copy()
+        least = np.zeros(len(x))  # what the depth is at least, as particles move on from where it was measured
         for _ in range(self.sweeps):
-            below, inward = depth(x)
-            near = below < REACH * spacing
-            images = x[near] - 2.0 * below[near, None] * inward[near]
+            near = np.flatnonzero(least < REACH * spacing)
+            least[near], inward = self._inside(x, near, depth, spacing)
+            images = x[near] - 2.0 * least[near, None] * inward
             push = _push(x, images, REACH * spacing)
-            length = np.linalg.norm(push, axis=1, keepdims=True)
-            x += push * (spacing * self.gain / np.maximum(1.0, self.gain * length / 0.1))
-            below, inward = depth(x)
-            x += np.maximum(0.25 * spacing - below, 0.0)[:, None] * inward  # none may leave
+            length = np.linalg.norm(push, axis=1)
+            step = spacing * self.gain / np.maximum(1.0, self.gain * length / 0.1)
+            x += push * step[:, None]
+            least -= length * step
+        self._inside(x, np.flatnonzero(least < REACH * spacing), depth, spacing)
         return x
+
+    @staticmethod
+    def _inside(x: np.ndarray, near: np.ndarray, depth: Any, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+        """Depth of the particles ``near`` the surface and unit vectors inwards; those that would leave are put back."""
+        below, inward = depth(x[near])
+        back = np.maximum(LEAST_DEPTH * spacing - below, 0.0)
+        x[near] += back[:, None] * inward
+        return below + back, inward
 
 
 @functools.cache

@@ -94,6 +94,8 @@ def record(
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
         measures = [probe.bind(simulation) for probe in recording.probes]  # wrong ones are told before files move
+        if resume and checkpoint is None and home.holds_a_run:
+            log.warning("%s has no checkpoint: the run starts anew, what is there moves to abandoned", home.path)
         if checkpoint is None:
             _begin(home, simulation, replace=replace or resume)
         else:
@@ -159,6 +161,7 @@ class _Recorder:
         resume: bool,
     ):
         self.home, self.simulation, self.recording, self.resumed = home, simulation, recording, resume
+        self.schedule = recording.schedule
         tables = [Table(home.probes / probe.name, probe.units) for probe in recording.probes]
         self.probes = list(zip(recording.probes, measures, tables, strict=True))
         self.snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, resume=True)
@@ -211,7 +214,7 @@ class _Recorder:
         return Outcome(simulation.t, simulation.steps, reason if state == "stopped" else None)
 
     def _advance(self, until: float) -> None:
-        schedule, simulation = self.recording.schedule, self.simulation
+        simulation, schedule = self.simulation, self.schedule
         target = next_target(schedule, simulation.t, until)
         simulation.advance(target, schedule.steps_left(simulation.steps))
 
