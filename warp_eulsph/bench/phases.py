@@ -21,7 +21,7 @@ OTHER = "other"
 
 
 class PhaseClock:
-    """Processor seconds spent in each phase of a stepper's steps from now on; inner phases are taken out of outer ones."""
+    """Processor seconds spent in each phase of a stepper's steps from now on, each without the phases inside it."""
 
     def __init__(self, stepper: Any):
         self.seconds: defaultdict[str, float] = defaultdict(float)
