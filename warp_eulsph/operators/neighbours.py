@@ -162,6 +162,7 @@ class NeighbourLists:
                 )
 
     def _reserve(self, pairs: int) -> None:
+        self._launch.forget()
         self.rows.index = wp.zeros(pairs, dtype=wp.int32, device=self.device)
         self.rows.w = wp.zeros(pairs, dtype=self.space.real, device=self.device)
 
