@@ -142,6 +142,20 @@ def test_long_rows_and_far_away_particles_are_found():
     assert all(np.array_equal(*both) for both in zip(found[False], found[True], strict=True))
 
 
+def test_rows_of_far_apart_indices_are_sorted():
+    """Indices that differ by more than 16 bits hold are ranked in full."""
+    n = 70_000
+    x = np.random.default_rng(6).permutation((np.arange(n) + 0.5) / n)[:, None]
+    found = {}
+    for simd in (False, True):
+        execution.set_simd(simd)
+        configuration = configuration_of(x, np.full(n, 1.0 / n), 1.3 / n)
+        found[simd] = configuration.near.index.numpy()[: configuration.lists.pairs].copy()
+    rows = found[True].reshape(-1, 1)
+    assert np.ptp(rows) > 65536
+    assert np.array_equal(found[False], found[True])
+
+
 def test_steps_record_their_launches_once():
     """A launch that is recorded anew in every step costs as much as none recorded, and piles up."""
     simulation = disordered(2, wp.float64, es.Always())

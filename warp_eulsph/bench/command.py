@@ -27,8 +27,9 @@ SECONDS_PER_ROUND = 0.5
 class Result:
     """What was measured of one case; rates are medians over rounds of steps.
 
-    ``roof_fraction`` is the least time of a step on this machine (see ``roof.py``) over the time it took;
-    ``cpu_fraction`` how much of the threads' time the machine gave to the process: rates mean little where it is low.
+    ``roof_fraction`` is the least time of a step on this machine (see ``roof.py``) over the processor time of a thread;
+    ``cpu_fraction`` how much of the threads' time the machine gave to the process: where others use it, rates per
+    second say little and those per processor second more.
     """
 
     case: str
@@ -89,9 +90,9 @@ def run(case: BenchCase) -> Result:
         wall.append((time.perf_counter() - wall_start) / steps)
         cpu.append((time.process_time() - cpu_start) / steps)
     clock = PhaseClock(simulation.stepper)
-    start = time.perf_counter()
+    start = time.process_time()
     simulation.step(steps)
-    total = time.perf_counter() - start
+    total = time.process_time() - start
     phases = dict(clock.seconds) | {OTHER: total - sum(clock.seconds.values())}
     neighbours = simulation.stepper.configuration.lists.pairs / n
     limits = limits_of(case.dtype, case.threads)
@@ -107,7 +108,7 @@ def run(case: BenchCase) -> Result:
         threads=case.threads,
         particle_steps_per_second=1.0 / seconds,
         particle_steps_per_cpu_second=1.0 / cpu_seconds,
-        roof_fraction=least / seconds,
+        roof_fraction=least / (cpu_seconds / case.threads),
         cpu_fraction=cpu_seconds / (case.threads * seconds),
         bytes_per_particle=array_bytes(simulation) / n,
         bandwidth=limits[0],
@@ -153,4 +154,4 @@ def line(result: Result) -> str:
     if result.cold_start_seconds is not None:
         text += f", start-up {result.cold_start_seconds:.1f} s cold, {result.warm_start_seconds:.1f} s warm"
     phases = ", ".join(f"{phase} {spent:.0f}" for phase, spent in result.phases.items() if spent >= 1.0)
-    return f"{text}\n    ns per particle-step: {phases}"
+    return f"{text}\n    processor time per particle-step [ns]: {phases}"

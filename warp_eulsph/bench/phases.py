@@ -21,7 +21,7 @@ OTHER = "other"
 
 
 class PhaseClock:
-    """Seconds spent in each phase of a stepper's steps from now on; inner phases are taken out of outer ones."""
+    """Processor seconds spent in each phase of a stepper's steps from now on, each without the phases inside it."""
 
     def __init__(self, stepper: Any):
         self.seconds: defaultdict[str, float] = defaultdict(float)
@@ -38,9 +38,9 @@ class PhaseClock:
     def _timed(self, phase: str, method: Any) -> Any:
         def timed(*arguments: Any) -> Any:
             self._inner.append(0.0)
-            start = time.perf_counter()
+            start = time.process_time()
             result = method(*arguments)
-            spent = time.perf_counter() - start
+            spent = time.process_time() - start
             self.seconds[phase] += spent - self._inner.pop()
             if self._inner:
                 self._inner[-1] += spent

@@ -118,7 +118,7 @@ _FILL = """
     constexpr int room = 512;
     int* const row = index.data + start.data[a];
     const int size = start.data[a + 1] - start.data[a];
-    int some[room + 16], rank[room + 16], n = 0;
+    int some[room + 16], n = 0;
     auto found = [&](I b, unsigned char bits) __attribute__((always_inline)) {
         if (size <= room) {
             append(some + n, b, bits);
@@ -137,14 +137,36 @@ _FILL = """
         {search}
         if (size > room) return;
     }
-    for (int i = 0; i < 8; ++i) some[size + i] = 0x7fffffff;
-    for (int v = 0; v < size; v += 8) {
-        I x, r = 0;
-        __builtin_memcpy(&x, some + v, sizeof(I));
-        for (int j = 0; j < size; ++j) r -= x > some[j];
-        __builtin_memcpy(rank + v, &r, sizeof(I));
+    if (size == 0) return;
+    int low = some[0], high = some[0];
+    for (int i = 1; i < size; ++i) {
+        low = some[i] < low ? some[i] : low;
+        high = some[i] > high ? some[i] : high;
     }
-    for (int i = 0; i < size; ++i) row[rank[i]] = some[i];
+    if (high - low < 65536) {  // nearly always: then 16 bits tell them apart, and a vector holds 16
+        typedef short H __attribute__((ext_vector_type(16)));
+        constexpr int vectors = 5;  // ranked at a time
+        short key[room + 16 * vectors], rank[room + 16 * vectors];
+        for (int i = 0; i < size; ++i) key[i] = short(some[i] - low - 32768);
+        for (int v = 0; v < size; v += 16 * vectors) {
+            H x[vectors], r[vectors];
+            __builtin_memcpy(x, key + v, sizeof(x));
+            #pragma unroll
+            for (int i = 0; i < vectors; ++i) r[i] = 0;
+            for (int j = 0; j < size; ++j) {
+                #pragma unroll
+                for (int i = 0; i < vectors; ++i) r[i] -= x[i] > key[j];
+            }
+            __builtin_memcpy(rank + v, r, sizeof(r));
+        }
+        for (int i = 0; i < size; ++i) row[rank[i]] = some[i];
+    } else {
+        for (int i = 0; i < size; ++i) {
+            int rank = 0;
+            for (int j = 0; j < size; ++j) rank += some[j] < some[i];
+            row[rank] = some[i];
+        }
+    }
 """
 
 

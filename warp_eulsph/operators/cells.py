@@ -209,6 +209,7 @@ class Cells:
         it goes.
         """
         if scratch is not self._scratch:
+            self._launch.forget()  # launches with arrays that the lists have outgrown
             size = len(scratch) * wp.types.type_size_in_bytes(self.space.real) // 4
             self._scratch, self._room = scratch, wp.array(ptr=scratch.ptr, shape=size, dtype=int, device=self.device)
         arguments = [place, self.h, self.body, self.box, self.support, self._frame, self._sides]

@@ -138,6 +138,7 @@ class NeighbourLists:
         self.rows = neighbour_structure(space)()
         self.rows.box = self.box
         self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self._builds = 0
         self._reserve(0)
 
     @property
@@ -161,6 +162,7 @@ class NeighbourLists:
                 )
 
     def _reserve(self, pairs: int) -> None:
+        self._launch.forget()
         self.rows.index = wp.zeros(pairs, dtype=wp.int32, device=self.device)
         self.rows.w = wp.zeros(pairs, dtype=self.space.real, device=self.device)
 
@@ -178,12 +180,13 @@ class NeighbourLists:
         self._search(x, scratch, fill=False)
         wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
         pairs = self.pairs
-        if pairs > self.capacity:
-            # Exactly what the first configuration needs, which may be the only one; then a quarter more than needed, so
-            # that a moving reference grows its lists seldom.
-            self._reserve(pairs + (pairs // 4 if self.capacity else 0))
+        # Exactly what the first configuration needs, which may be the only one; from the second on a quarter more than
+        # needed, so that a moving reference grows its lists seldom.
+        if pairs > self.capacity or self._builds == 1:
+            self._reserve(pairs + (pairs // 4 if self._builds else 0))
             log.debug("neighbour lists grew to %d pairs", self.capacity)
         self._search(x, scratch, fill=True)
+        self._builds += 1
 
     def _search(self, x: wp.array, scratch: wp.array, fill: bool) -> None:
         if self.cells is not None:
