@@ -456,6 +456,10 @@ def test_mistakes_that_only_particles_show_are_value_errors():
     case = parse_case(small(boundary=[{"kind": "Fixed", "region": "x > 9"}]))
     with pytest.raises(ValueError, match="the region selects no particle"):
         case.build()
+    data = small()
+    data["body"]["a"]["shape"] = {"kind": "ring", "centre": [0, 0], "inner": 2, "outer": 1, "spacing": 0.1}
+    with pytest.raises(ValueError, match=r"body\.a\.shape: ring: inner must be below outer, got 2.0 and 1.0 m"):
+        parse_case(data).build()
 
 
 def test_unreadable_files_are_named(tmp_path):
