@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -145,7 +146,9 @@ def test_wrong_input_is_two(case, tmp_path, capsys):
 def test_unstable_run_is_three(case, tmp_path, capsys):
     assert main(["run", str(case), "-o", str(tmp_path / "run"), "-s", "push=300.0", "--until", "0.1"]) == 3
     assert "last good snapshot is" in capsys.readouterr().err
-    assert Run(tmp_path / "run").state == "unstable"
+    run = Run(tmp_path / "run")
+    assert run.state == "unstable"
+    assert run.probes["corner"]["step"][-1] == run.status["step"] - 1  # all but the step that failed
 
 
 def test_full_disk_is_one_and_can_be_resumed(case, tmp_path, capsys, monkeypatch):
@@ -168,6 +171,12 @@ def test_toml_cases_and_examples(tmp_path):
     assert run.description["case"]["settings"]["parameters"]["n"] == 5
     path.unlink()
     assert main(["resume", str(tmp_path / "run"), "--until", "1.1e-3"]) == 0
+    program = tmp_path / "program.py"
+    path.write_text(TOML)
+    program.write_text(f"from warp_eulsph.cases import read_case\nCASE = read_case({str(path)!r})\n")
+    assert main(["run", str(program), "-o", str(tmp_path / "other"), "--device", "cpu"]) == 0
+    assert Run(tmp_path / "other")[0].N == 36
+    assert main(["run", str(program), "-o", str(tmp_path / "third"), "-s", "n=3"]) == 2
     assert "punch" in examples()
     assert load_case("example:punch", ["parameters.n=8"]).build().x.shape == (64, 2)
 
@@ -212,6 +221,21 @@ def test_durations():
     assert [duration(text) for text in ("90", "90s", "1.5m", "3h", "2d")] == [90.0, 90.0, 90.0, 10800.0, 172800.0]
     with pytest.raises(SystemExit):
         main(["run", "example:punch", "--max-wall", "soon"])
+
+
+def test_documented_programs_run(tmp_path, monkeypatch, capsys):
+    """The Python of docs/runs.md, one block after the other; the first is a case file too."""
+    text = (Path(__file__).parents[1] / "docs" / "runs.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    Path("column.py").write_text(blocks[0])
+    assert main(["run", "column.py", "-s", "young=18e6", "--until", "0.01"]) == 0
+    assert Run("runs/column").probe_names == ["base", "corner"]
+    monkeypatch.chdir(tmp_path / "runs")
+    names = {}
+    for block in blocks:
+        exec(compile(block, "runs.md", "exec"), names)
+    assert names["run"].times[-1] == 0.03 and len(blocks) == 3
 
 
 def test_help_loads_no_pictures_no_meshes_no_hdf5():

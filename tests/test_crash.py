@@ -3,7 +3,9 @@
 import errno
 import os
 import random
+import shutil
 import signal
+import subprocess
 import sys
 import time
 
@@ -133,6 +135,31 @@ def test_full_disk_is_one_clean_error(short, tmp_path, monkeypatch, share):
         assert read_snapshot(path).step == int(path.stem)
     run(tmp_path / "full", until=SHORT, resume=True)
     assert contents(tmp_path / "full") == short
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 300 kB, where a test may mount one: (path, function that makes it large)."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "tmpfs", str(place), "-o"]
+    if shutil.which("mount") is None or subprocess.run([*mount, "size=300k"], capture_output=True).returncode != 0:
+        pytest.skip("no right to mount a file system")
+    yield place, lambda: subprocess.run([*mount, "remount,size=50m"], check=True)
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def test_full_file_system_is_one_clean_error(small_disk, tmp_path):
+    place, enlarge = small_disk
+    with pytest.raises(OSError, match="No space left on device"):
+        run(place / "run", until=LONG)
+    manifest = Manifest(place / "run")
+    manifest.read()
+    assert len(manifest.entries) >= 2 and not manifest.damaged()
+    enlarge()
+    run(place / "run", until=LONG, resume=True)
+    run(tmp_path / "whole", until=LONG)
+    assert contents(place / "run") == contents(tmp_path / "whole")
 
 
 def test_no_flipped_bit_goes_unseen(tmp_path):

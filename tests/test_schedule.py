@@ -1,5 +1,6 @@
 """Schedules: what is due when, and times that are hit exactly."""
 
+import itertools
 import math
 
 import pytest
@@ -40,6 +41,16 @@ def test_any_of_several():
     assert both.next_time(0.0) == 0.3 and both.next_time(0.3) == 0.4
     assert both.due(0.4, 1) and both.due(0.1, 5) and not both.due(0.1, 4)
     assert both.steps_left(3) == 2 and AnyOf([AtTimes()]).steps_left(3) is None
+
+
+def test_times_that_differ_by_round_off_are_one():
+    """4 · 0.3 ms, 3 · 0.4 ms and 1.2 ms are two doubles: no step lies between them, and all are due."""
+    assert 4 * 3e-4 != 3 * 4e-4
+    for other in (EveryTime(4e-4), AtTimes([4e-4, 3 * 4e-4])):
+        times = list(targets(AnyOf([EveryTime(3e-4), other]), 0.0, 1.3e-3))
+        assert len(times) == (7 if isinstance(other, EveryTime) else 6)
+        assert min(b - a for a, b in itertools.pairwise(times)) > 1e-5
+        assert other.due(4 * 3e-4, 1)
 
 
 def test_the_end_swallows_a_target_a_hair_before_it():

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-# Times closer than this share of an interval are one time: a step between them would be round-off.
+# Times closer than this share of an interval, or of themselves, are one: a step between them would be round-off.
 SAME = 1e-9
 
 
@@ -90,10 +90,10 @@ class AtTimes(Schedule):
         object.__setattr__(self, "times", times)
 
     def due(self, t: float, step: int) -> bool:
-        return t in self.times
+        return any(abs(t - time) <= SAME * abs(time) for time in self.times)
 
     def next_time(self, t: float) -> float:
-        return next((time for time in self.times if time > t), math.inf)
+        return next((time for time in self.times if time - t > SAME * abs(time)), math.inf)
 
 
 @dataclass(frozen=True)

@@ -67,9 +67,9 @@ class Simulation:
         self.device = wp.get_device(device)
         self.boundaries = tuple(boundaries)
         check_reference([body.material for body in self.bodies], reference)
-        self.dilation = dilation
         if not (np.isfinite(dilation) and dilation > 0.0):
             raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
+        self.dilation = dilation
         box = _checked_box(periodic, self.space.dim)
         counts = [len(body.x) for body in self.bodies]
         ends = np.cumsum([0, *counts])
@@ -148,14 +148,18 @@ class Simulation:
             UnstableError: det F ≤ 0 or non-finite values.
         """
         self.clock.aim(until)
+        self._take_steps(most)
+
+    def _advance(self, until: float) -> None:
+        self.clock.aim(until)
+        while self.t < until:
+            self._take_steps(None)
+
+    def _take_steps(self, most: int | None) -> None:
         batch = STEPS_BETWEEN_LOOKS if self.device.is_cuda else 1
         for _ in range(batch if most is None else min(batch, most)):
             self.stepper.step()
         self._raise_if_bad()
-
-    def _advance(self, until: float) -> None:
-        while self.t < until:
-            self.advance(until)
 
     # what a checkpoint holds
 

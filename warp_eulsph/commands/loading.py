@@ -93,24 +93,39 @@ def _load_toml(path: Path, overrides: Sequence[str], device: str | None) -> tupl
 
 def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
     module = _module(path)
+    case: Any = getattr(module, "CASE", None)
+    if hasattr(case, "build"):
+        if overrides:
+            raise ValueError(f"{path} defines CASE, which takes no settings, got {list(overrides)}")
+        return _on(device, case.build), case.until, case.recording, case.describe()
     settings = dict(_setting(override) for override in overrides)
     build, until = getattr(module, "build", None), getattr(module, "UNTIL", None)
     if not callable(build) or not isinstance(until, int | float):
-        raise ValueError(f"{path} must define build(**settings) -> Simulation and UNTIL, the end time in seconds")
+        raise ValueError(
+            f"{path} must define build(**settings) -> Simulation and UNTIL, the end time in seconds, or a CASE"
+        )
     known = inspect.signature(build).parameters
     if not any(parameter.kind is parameter.VAR_KEYWORD for parameter in known.values()):
         wrong = [name for name in settings if name not in known]
         if wrong:
             raise ValueError(f"{path}: build has no setting {wrong[0]!r}; it has {list(known) or 'none'}")
 
+    given = getattr(module, "recording", lambda simulation: Recording())
+    return _on(device, lambda: build(**settings)), float(until), given, settings
+
+
+def _on(device: str | None, build: Callable[[], Simulation]) -> Callable[[], Simulation]:
+    """``build`` where ``device`` is Warp's default device."""
+    if device is None:
+        return build
+
     def made() -> Simulation:
         import warp as wp
 
         with wp.ScopedDevice(device):
-            return build(**settings)
+            return build()
 
-    given = getattr(module, "recording", lambda simulation: Recording())
-    return made, float(until), given, settings
+    return made
 
 
 def _setting(override: str) -> tuple[str, Any]:

@@ -9,7 +9,7 @@ from ..simulation import Simulation
 
 log = logging.getLogger(__name__)
 
-_BAR = "{percentage:5.1f}% {bar} {postfix} [{elapsed}, {remaining} left]"
+_BAR = "{percentage:5.1f}% |{bar:12}| {remaining} left{postfix}"
 
 
 class Progress:

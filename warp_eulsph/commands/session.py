@@ -48,7 +48,7 @@ def carry_out(
             )
     except UnstableError as error:
         return complain(error, UNSTABLE)
-    except (FileExistsError, FileNotFoundError, ValueError, BusyError) as error:
+    except (FileExistsError, FileNotFoundError, ModuleNotFoundError, ValueError, BusyError) as error:
         return complain(error, BAD_INPUT)
     except OSError as error:
         return complain(f"{error}; what was written before is whole, warp-eulsph resume {directory} goes on", FAILED)

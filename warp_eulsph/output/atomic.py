@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 
 
-def replace_file(path: Path, content: bytes) -> None:
-    """Write a temporary file beside ``path``, force it to disk, then put it in place in one move.
+def replace_file(path: Path, *parts: bytes | memoryview) -> None:
+    """Write ``parts`` one after the other to a file beside ``path``, force it to disk, and move it into place.
 
     Whatever fails, ``path`` holds either what it held before or all of the new content, and no temporary file stays.
 
@@ -19,7 +19,8 @@ def replace_file(path: Path, content: bytes) -> None:
     try:
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
         try:
-            _write_all(descriptor, content)
+            for part in parts:
+                _write_all(descriptor, part)
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
@@ -74,7 +75,7 @@ def synchronise(path: Path) -> None:
         os.close(descriptor)
 
 
-def _write_all(descriptor: int, content: bytes) -> None:
+def _write_all(descriptor: int, content: bytes | memoryview) -> None:
     view = memoryview(content)
     while view:
         view = view[os.write(descriptor, view) :]

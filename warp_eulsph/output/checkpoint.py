@@ -55,8 +55,8 @@ def take(simulation: Simulation, description: Mapping[str, Any], environment: Ma
     return Checkpoint(simulation.t, simulation.steps, counters, arrays, dict(description), dict(environment))
 
 
-def encode(checkpoint: Checkpoint) -> bytes:
-    """The file of a checkpoint."""
+def encode(checkpoint: Checkpoint) -> list[bytes | memoryview]:
+    """The file of a checkpoint, part by part; the arrays are not copied."""
     header = {
         "time": checkpoint.time,
         "step": checkpoint.step,
@@ -65,11 +65,13 @@ def encode(checkpoint: Checkpoint) -> bytes:
         "description": checkpoint.description,
         "environment": checkpoint.environment,
     }
-    parts = [FORMAT, json.dumps(header).encode() + b"\n", *(array.tobytes() for array in checkpoint.arrays.values())]
+    flat = (np.ascontiguousarray(array).reshape(-1).view(np.uint8) for array in checkpoint.arrays.values())
+    parts: list[bytes | memoryview] = [FORMAT, json.dumps(header).encode() + b"\n"]
+    parts += [memoryview(array) for array in flat]  # type: ignore[arg-type]
     digest = hashlib.sha256()
     for part in parts:
         digest.update(part)
-    return b"".join([*parts, digest.digest()])
+    return [*parts, digest.digest()]
 
 
 def decode(content: bytes) -> Checkpoint:
@@ -115,7 +117,7 @@ class Checkpoints:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{checkpoint.step:010d}.ckpt"
-        replace_file(path, encode(checkpoint))
+        replace_file(path, *encode(checkpoint))
         for old in self.paths()[:-KEPT]:
             old.unlink()
         return path
@@ -138,5 +140,5 @@ class Checkpoints:
                 log.warning("using checkpoint %s of step %d, t = %.8g s", path, checkpoint.step, checkpoint.time)
             return checkpoint
         if damaged:
-            raise DamagedError(f"no checkpoint is whole: {'; '.join(damaged)}")
+            raise DamagedError(f"no checkpoint is whole, the run must start anew: {'; '.join(damaged)}")
         return None

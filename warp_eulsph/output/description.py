@@ -60,7 +60,7 @@ def plain(value: Any) -> Any:
     return f"{type(value).__name__}"
 
 
-def _function(function: Callable[..., Any]) -> Any:
+def _function(function: Callable[..., Any], deep: bool = True) -> Any:
     if isinstance(function, functools.partial):
         inside = [plain(function.args), plain(function.keywords)]
         return {"partial": _function(function.func), "arguments": inside}
@@ -70,12 +70,18 @@ def _function(function: Callable[..., Any]) -> Any:
         source = inspect.getsource(function)
     except OSError:  # typed at a prompt: the compiled code is all there is
         source = function.__code__.co_code.hex() + repr(function.__code__.co_consts)
-    enclosed = inspect.getclosurevars(function).nonlocals
-    return {
-        "function": function.__qualname__,
-        "sha256": hashlib.sha256(source.encode()).hexdigest(),
-        "enclosed": {name: plain(item) for name, item in enclosed.items() if not callable(item)},
-    }
+    described = {"function": function.__qualname__, "sha256": hashlib.sha256(source.encode()).hexdigest()}
+    if not deep:
+        return described
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    enclosed = {name: cell.cell_contents for name, cell in cells}
+    return {**described, "enclosed": {name: _enclosed(item) for name, item in enclosed.items()}}
+
+
+def _enclosed(value: Any) -> Any:
+    """What a function encloses; of another function not what that one encloses, which may be the first."""
+    function = value.func if isinstance(value, wp.Function) else value
+    return _function(function, deep=False) if inspect.isfunction(function) else plain(value)
 
 
 def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:

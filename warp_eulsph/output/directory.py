@@ -36,6 +36,10 @@ _TOP = (
 )
 
 
+# Those who only look whether somebody writes here hold the lock for a moment [s].
+_LOOK = 0.2
+
+
 class BusyError(RuntimeError):
     """Another process, or another run of this one, writes into the directory."""
 
@@ -71,7 +75,7 @@ class RunDirectory:
         self.path.mkdir(parents=True, exist_ok=True)
         lock = FileLock(self.path / "run.lock")
         try:
-            lock.acquire(timeout=0)
+            lock.acquire(timeout=_LOOK)
         except Timeout:
             raise BusyError(f"another run writes into {self.path}; choose another directory, or wait for it") from None
         try:
@@ -81,13 +85,13 @@ class RunDirectory:
 
     @property
     def busy(self) -> bool:
-        """Whether somebody writes here now."""
+        """Whether somebody writes here now; also true where this cannot be found out, in a folder that is read only."""
         if not (self.path / "run.lock").exists():
             return False
         try:
             with self.locked():
                 return False
-        except BusyError:
+        except (BusyError, OSError):
             return True
 
     def abandon(self) -> Path | None:

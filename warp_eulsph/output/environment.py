@@ -1,6 +1,7 @@
 """Where a run took place: versions, device, precision. Equal bits are promised where these are equal."""
 
 import platform
+from pathlib import Path
 from typing import Any
 
 from ..simulation import Simulation
@@ -16,7 +17,20 @@ def environment(simulation: Simulation) -> dict[str, Any]:
             "python": platform.python_version(),
             **{name: metadata.version(name) for name in ("warp-eulsph", "warp-lang", "numpy", "h5py")},
         },
-        "device": {"name": device.name or platform.processor(), "kind": "cuda" if device.is_cuda else "cpu"},
+        "device": {
+            "name": device.name if device.is_cuda else _processor(),
+            "kind": "cuda" if device.is_cuda else "cpu",
+        },
         "machine": {"system": platform.system(), "architecture": platform.machine()},
         "dtype": simulation.space.real.__name__,
     }
+
+
+def _processor() -> str:
+    """Model of the processor, for which kernels are compiled."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:  # not Linux
+        return platform.processor()
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor())

@@ -17,7 +17,7 @@ from ..simulation import Simulation
 from ..space import Space
 from ..weights import Weight
 from ..weights.base import value
-from .stress import body_stress
+from .stress import body_stress, stresses
 
 #: Figures of the present state, by name; the same names and shapes every time.
 Measure = Callable[[], dict[str, Any]]
@@ -44,7 +44,7 @@ class Probe(ABC):
 
     @abstractmethod
     def bind(self, simulation: Simulation) -> Measure:
-        """What measures; called at the start of a run, before its first step, and when it is resumed.
+        """What measures; made before the first step, for a run that is resumed too.
 
         Raises:
             ValueError: what is looked at is not in the simulation.
@@ -74,13 +74,14 @@ class PointProbe(Probe):
             raise ValueError(f"probe {self.name!r}: X must be ({simulation.space.dim},) finite numbers, got {self.X}")
         near, share = _shape_functions(simulation, body, point, self.name)
         indices = wp.array(near + simulation.ranges[body.name].start, dtype=wp.int32, device=simulation.device)
-        U, real = simulation.stepper.U, simulation.space.real
+        U, space = simulation.stepper.U, simulation.space
+        stress = stresses(space, len(near), simulation.device)
 
         def measure() -> dict[str, Any]:
-            x, v, F = (array[indices].numpy() for array in (U.x, U.v, U.F))
-            stress = body_stress(body.material, F, real, simulation.device)
+            x, v, F = (array[indices].contiguous() for array in (U.x, U.v, U.F))
+            body_stress(space, body.material, range(len(near)), F, stress)
             fields = {"x": x, "v": v, "F": F, "cauchy_stress": stress}
-            return {name: np.tensordot(share, field.astype(float), 1) for name, field in fields.items()}
+            return {name: np.tensordot(share, field.numpy().astype(float), 1) for name, field in fields.items()}
 
         return measure
 

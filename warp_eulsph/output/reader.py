@@ -122,6 +122,18 @@ class Comparison:
     largest: dict[str, np.ndarray]
 
 
+class ProbeTable(dict[str, np.ndarray]):
+    """Columns of a probe by name, (rows, …) each, ``step`` and ``t`` [s] among them.
+
+    Attributes:
+        units: SI units of the columns, by name.
+    """
+
+    def __init__(self, columns: Mapping[str, np.ndarray], units: Mapping[str, str]):
+        super().__init__(columns)
+        self.units = dict(units)
+
+
 class Run(Sequence[RunFrame]):
     """The directory of a run, read lazily; it may still be running.
 
@@ -198,9 +210,9 @@ class Run(Sequence[RunFrame]):
         return read_log(self.directory.log)
 
     @cached_property
-    def probes(self) -> dict[str, dict[str, np.ndarray]]:
-        """Columns of each probe's table, by its name."""
-        return {name: read_table(self.directory.probes / name)[0] for name in self.probe_names}
+    def probes(self) -> dict[str, ProbeTable]:
+        """The table of each probe, by its name."""
+        return {name: ProbeTable(*read_table(self.directory.probes / name)) for name in self.probe_names}
 
     @property
     def probe_names(self) -> list[str]:

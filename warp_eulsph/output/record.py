@@ -3,7 +3,7 @@
 import logging
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -16,6 +16,7 @@ from .description import describe, differences, plain
 from .directory import RunDirectory
 from .environment import environment
 from .log import append, cut, look
+from .probes import Measure
 from .recording import Recording
 from .series import SnapshotWriter
 from .snapshot import collect
@@ -84,7 +85,7 @@ def record(
         DamagedError: no checkpoint is whole.
         UnstableError: see ``Simulation.run``; the last checkpoint and snapshot stay.
         OSError: the disk refused; all that was written before is whole, and the run can be resumed.
-        ValueError: ``until`` is before the present time.
+        ValueError: ``until`` is before the present time, or a probe looks at what is not there.
     """
     home = RunDirectory(directory)
     with home.locked():
@@ -92,13 +93,16 @@ def record(
         present = simulation.t if checkpoint is None else checkpoint.time
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
+        measures = [probe.bind(simulation) for probe in recording.probes]  # wrong ones are told before files move
+        if resume and checkpoint is None and home.holds_a_run:
+            log.warning("%s has no checkpoint: the run starts anew, what is there moves to abandoned", home.path)
         if checkpoint is None:
             _begin(home, simulation, replace=replace or resume)
         else:
             _go_on(home, simulation, recording, checkpoint, force=force)
         kept = {"until": until, "case": dict(case or {}), **_description(simulation, recording)}
         home.write(home.description, kept)
-        recorder = _Recorder(home, simulation, recording, resume=checkpoint is not None)
+        recorder = _Recorder(home, simulation, recording, measures, resume=checkpoint is not None)
         return recorder.run(until, stop, watch)
 
 
@@ -147,10 +151,19 @@ def _compare(checkpoint: Checkpoint, simulation: Simulation, recording: Recordin
 class _Recorder:
     """Writes what is due, in the background."""
 
-    def __init__(self, home: RunDirectory, simulation: Simulation, recording: Recording, *, resume: bool):
+    def __init__(
+        self,
+        home: RunDirectory,
+        simulation: Simulation,
+        recording: Recording,
+        measures: Sequence[Measure],
+        *,
+        resume: bool,
+    ):
         self.home, self.simulation, self.recording, self.resumed = home, simulation, recording, resume
-        self.measures = [(probe, probe.bind(simulation)) for probe in recording.probes]
-        self.tables = {probe.name: Table(home.probes / probe.name, probe.units) for probe in recording.probes}
+        self.schedule = recording.schedule
+        tables = [Table(home.probes / probe.name, probe.units) for probe in recording.probes]
+        self.probes = list(zip(recording.probes, measures, tables, strict=True))
         self.snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, resume=True)
         self.snapshots.derive()
         self.checkpoints = Checkpoints(home.checkpoints)
@@ -188,6 +201,8 @@ class _Recorder:
             state = "done" if reason is None or simulation.t >= until else "stopped"
         except UnstableError as error:
             state, reason = "unstable", str(error)
+            self._flush_lines()  # what came before the failure tells most about it
+            self._flush_tables(1)
             raise
         except BaseException as error:
             reason = f"{type(error).__name__}: {error}"
@@ -199,7 +214,7 @@ class _Recorder:
         return Outcome(simulation.t, simulation.steps, reason if state == "stopped" else None)
 
     def _advance(self, until: float) -> None:
-        schedule, simulation = self.recording.schedule, self.simulation
+        simulation, schedule = self.simulation, self.schedule
         target = next_target(schedule, simulation.t, until)
         simulation.advance(target, schedule.steps_left(simulation.steps))
 
@@ -212,9 +227,9 @@ class _Recorder:
             self.worker.submit(lambda: self.snapshots.commit(frame))
         if everything or recording.log.due(t, step):
             self.lines.append(look(simulation))
-        for probe, measure in self.measures:
+        for probe, measure, table in self.probes:
             if everything or probe.schedule.due(t, step):
-                self.tables[probe.name].add(step, t, measure())
+                table.add(step, t, measure())
         if now - self.checked > recording.checkpoint:
             self.checkpoint()
         elif now - self.flushed > _PATIENCE:
@@ -235,7 +250,7 @@ class _Recorder:
             self.worker.submit(lambda: append(self.home.log, lines))
 
     def _flush_tables(self, least: int) -> None:
-        for table in self.tables.values():
+        for _, _, table in self.probes:
             if len(table) >= least:
                 self._submit_rows(table)
 

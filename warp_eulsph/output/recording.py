@@ -20,7 +20,8 @@ class Recording:
         snapshots: when a snapshot is written besides the start and the end.
         fields: names of ``FIELDS`` in them; all by default.
         dtype: ``np.float32`` or ``np.float64`` of their reals.
-        log: when energies, momenta and extrema go to the log besides the start and the end.
+        log: when energies, momenta and extrema go to the log besides the start and the end. A GPU takes 8 steps
+            between two looks at it, so that other numbers of steps cost time there.
         probes: what goes to tables of its own.
         checkpoint: wall time between checkpoints [s]; one is written at the start, at the end and at a stop, too.
 
@@ -31,7 +32,7 @@ class Recording:
     snapshots: Schedule = AtTimes()
     fields: Iterable[str] | None = None
     dtype: Any = np.float32
-    log: Schedule = EverySteps(10)
+    log: Schedule = EverySteps(16)
     probes: Sequence[Probe] = ()
     checkpoint: float = 600.0
 

@@ -16,59 +16,48 @@ from .stress import cauchy_stress, padded
 
 
 class SnapshotField(NamedTuple):
-    """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and where it comes from."""
+    """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and how it is made of sources."""
 
     shape: Callable[[int], tuple[int, ...]]
     unit: str
     meaning: str
-    values: Callable[["_State"], np.ndarray]
+    sources: tuple[str, ...]
+    values: Callable[..., np.ndarray] = lambda source: source
 
 
-class _State:
-    """The present state on the host; what several fields need is computed once."""
-
-    def __init__(self, simulation: Simulation):
-        self.simulation = simulation
-        self.F = simulation.F
-        self.J = np.linalg.det(self.F)
-        self._stress: np.ndarray | None = None
-
-    @property
-    def stress(self) -> np.ndarray:
-        if self._stress is None:
-            self._stress = cauchy_stress(self.simulation)
-        return self._stress
-
-
-def _density(state: _State) -> np.ndarray:
-    particles = state.simulation.particles
-    return particles.mass.numpy() / (particles.V0.numpy() * state.J)
-
+#: What fields are made of: copied from the device while the run waits, where what is made of them is not.
+SOURCES: dict[str, Callable[[Simulation], np.ndarray]] = {
+    "x": lambda simulation: simulation.x,
+    "v": lambda simulation: simulation.v,
+    "F": lambda simulation: simulation.F,
+    "J": lambda simulation: simulation.J,
+    "stress": cauchy_stress,
+    "mass": lambda simulation: simulation.particles.mass.numpy().copy(),
+    "V0": lambda simulation: simulation.particles.V0.numpy().copy(),
+    "body": lambda simulation: simulation.particles.body.numpy().copy(),
+    "share": lambda simulation: simulation.particles.share.numpy().copy(),
+}
 
 #: Every field that a snapshot can hold. Stress has nine components in any dimension: σ33 of plane strain counts.
 FIELDS = {
-    "velocity": SnapshotField(lambda d: (d,), STATE["v"].unit, STATE["v"].meaning, lambda s: s.simulation.v),
+    "velocity": SnapshotField(lambda d: (d,), STATE["v"].unit, STATE["v"].meaning, ("v",)),
     "deformation_gradient": SnapshotField(
-        lambda d: (d, d), STATE["F"].unit, STATE["F"].meaning + "; missing stretches are 1", lambda s: s.F
+        lambda d: (d, d), STATE["F"].unit, STATE["F"].meaning + "; missing stretches are 1", ("F",)
     ),
-    "J": SnapshotField(lambda d: (), "-", "volume over initial volume, det F", lambda s: s.J),
-    "cauchy_stress": SnapshotField(lambda d: (3, 3), "Pa", "Cauchy stress", lambda s: s.stress),
+    "J": SnapshotField(lambda d: (), "-", "volume over initial volume, det F", ("J",)),
+    "cauchy_stress": SnapshotField(lambda d: (3, 3), "Pa", "Cauchy stress", ("stress",)),
     "pressure": SnapshotField(
-        lambda d: (), "Pa", "pressure, minus a third of the trace of the stress", lambda s: -np.trace(s.stress.T) / 3.0
-    ),
-    "density": SnapshotField(lambda d: (), "kg/m^3", "density", _density),
-    "body": SnapshotField(
         lambda d: (),
-        PARTICLES["body"].unit,
-        PARTICLES["body"].meaning,
-        lambda s: s.simulation.particles.body.numpy().copy(),
+        "Pa",
+        "pressure, minus a third of the trace of the stress",
+        ("stress",),
+        lambda stress: -np.trace(stress.T) / 3.0,
     ),
-    "share": SnapshotField(
-        lambda d: (),
-        PARTICLES["share"].unit,
-        PARTICLES["share"].meaning,
-        lambda s: s.simulation.particles.share.numpy().copy(),
+    "density": SnapshotField(
+        lambda d: (), "kg/m^3", "density", ("mass", "V0", "J"), lambda mass, V0, J: mass / (V0 * J)
     ),
+    "body": SnapshotField(lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, ("body",)),
+    "share": SnapshotField(lambda d: (), PARTICLES["share"].unit, PARTICLES["share"].meaning, ("share",)),
 }
 
 
@@ -110,21 +99,32 @@ class Frame:
 
     Attributes:
         time: [s]. step: steps taken. dim: dimension.
-        x: positions [m], (n, dim). values: fields by name, in their natural shape.
+        names: of the fields to write. sources: what they are made of, (n, …) each, with the positions ``x`` [m].
     """
 
     time: float
     step: int
     dim: int
-    x: np.ndarray
-    values: dict[str, np.ndarray]
+    names: tuple[str, ...]
+    sources: dict[str, np.ndarray]
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions [m], (n, dim)."""
+        return self.sources["x"]
+
+    def values(self) -> dict[str, np.ndarray]:
+        """The fields by name, in their natural shape."""
+        fields = ((name, FIELDS[name]) for name in self.names)
+        return {name: field.values(*(self.sources[source] for source in field.sources)) for name, field in fields}
 
 
 def collect(simulation: Simulation, names: Iterable[str]) -> Frame:
-    """The present state's fields of these ``names``, copied."""
-    source = _State(simulation)
-    values = {name: FIELDS[name].values(source) for name in names}
-    return Frame(simulation.t, simulation.steps, simulation.space.dim, simulation.x, values)
+    """What the fields of these ``names`` are made of in the present state, copied."""
+    names = tuple(names)
+    needed = dict.fromkeys(["x", *(source for name in names for source in FIELDS[name].sources)])
+    sources = {name: SOURCES[name](simulation) for name in needed}
+    return Frame(simulation.t, simulation.steps, simulation.space.dim, names, sources)
 
 
 def checked_precision(dtype: Any) -> np.dtype:
@@ -161,7 +161,7 @@ def encode(frame: Frame, dtype: np.dtype) -> bytes:
     """The file of a frame, made in memory: HDF5 itself leaves wrecks on a full disk, and errors that come too late."""
     import h5py
 
-    dim, n = frame.dim, len(frame.x)
+    dim, n, values = frame.dim, len(frame.x), frame.values()
     memory = io.BytesIO()
     # VTK's HDF5 is older than h5py's: newer file formats than 1.10's do not open there.
     with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
@@ -177,9 +177,9 @@ def encode(frame: Frame, dtype: np.dtype) -> bytes:
         root["Points"].attrs["unit"] = STATE["x"].unit
         _write_cells(root, n)
         data = root.create_group("PointData")
-        for name, value in frame.values.items():
+        for name, value in values.items():
             _write_field(data, name, value, dim, dtype)
-        _mark_active(data, frame.values)
+        _mark_active(data, values)
         root["FieldData/TimeValue"] = np.array([frame.time])  # the name VTK gives to a data set's time
         root["FieldData/Step"] = np.array([frame.step], dtype=np.int64)
     return memory.getvalue()

@@ -9,7 +9,7 @@ import warp as wp
 from ..materials import Law, Material
 from ..scheme.flux import stress_in_reference
 from ..simulation import Simulation
-from ..space import Space
+from ..space import Space, matrix_type
 
 
 def padded(tensors: np.ndarray, diagonal: float) -> np.ndarray:
@@ -22,34 +22,49 @@ def padded(tensors: np.ndarray, diagonal: float) -> np.ndarray:
 
 
 @functools.cache
-def _make_cauchy(space: Space, law: Law) -> Any:
-    mat, Constants = space.mat, law.Constants
-    Q_of = stress_in_reference(space, law)
+def _make_cauchy(space: Space, full: Space, law: Law) -> Any:
+    """Kernel: σ of F in the space of the simulation, by a law in ``full`` dimensions with missing stretches of one."""
+    real, mat, Constants = space.real, space.mat, law.Constants
+    mat33, dim, full_dim = matrix_type(3, 3, space.real), space.dim, full.dim
+    Q_of = stress_in_reference(full, law)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def cauchy(F: wp.array(dtype=mat), c: Constants, sigma: wp.array(dtype=mat)):
-        a = wp.tid()
-        sigma[a] = Q_of(F[a], F[a], c)
+    def cauchy(first: int, F: wp.array(dtype=mat), c: Constants, sigma: wp.array(dtype=mat33)):
+        i = wp.tid()
+        F_i = F[first + i]
+        G = wp.identity(n=wp.static(full_dim), dtype=real)
+        for j in range(wp.static(dim)):
+            for k in range(wp.static(dim)):
+                G[j, k] = F_i[j, k]
+        stress = Q_of(G, G, c)
+        out = mat33()
+        for j in range(wp.static(full_dim)):
+            for k in range(wp.static(full_dim)):
+                out[j, k] = stress[j, k]
+        sigma[first + i] = out
 
     return cauchy
 
 
-def body_stress(material: Material, F: np.ndarray, real: type, device: Any) -> np.ndarray:
-    """σ of deformation gradients ``F`` (n, dim, dim) of one material [Pa], (n, 3, 3)."""
+def body_stress(space: Space, material: Material, body: range, F: wp.array, sigma: wp.array) -> None:
+    """σ [Pa] of the deformation gradients ``F`` of one material's particles into ``sigma``, (n,) of 3 × 3."""
+    full = Space(3, space.real)
     try:
-        space = Space(3, real)
-        law = material.law(space)
+        law = material.law(full)
     except ValueError:
         # A law of fewer dimensions only, a bar: uniaxial stress, the components it does not give are zero.
-        space = Space(F.shape[1], real)
-        law = material.law(space)
+        full = Space(space.dim, space.real)
+        law = material.law(full)
     constants = law.Constants()
     for name, value in material.constants().items():
         setattr(constants, name, value)
-    gradients = wp.array(padded(F, 1.0) if space.dim == 3 else F, dtype=space.mat, device=device)
-    sigma = wp.zeros_like(gradients)
-    wp.launch(_make_cauchy(space, law), len(F), [gradients, constants, sigma], device=device)
-    return padded(sigma.numpy(), 0.0)
+    arguments = [body.start, F, constants, sigma]
+    wp.launch(_make_cauchy(Space(space.dim, space.real), full, law), len(body), arguments, device=F.device)
+
+
+def stresses(space: Space, n: int, device: Any) -> wp.array:
+    """An array for ``n`` stresses of 3 × 3 reals."""
+    return wp.empty(n, dtype=matrix_type(3, 3, space.real), device=device)
 
 
 def cauchy_stress(simulation: Simulation) -> np.ndarray:
@@ -57,7 +72,8 @@ def cauchy_stress(simulation: Simulation) -> np.ndarray:
 
     In 2-D and 1-D the 3-D law acts on F with the missing stretches equal to one, so σ33 of plane strain is there too.
     """
-    F, real, device = simulation.F, simulation.space.real, simulation.device
-    ends = np.cumsum([len(body.x) for body in simulation.bodies])[:-1]
-    parts = zip(simulation.bodies, np.split(F, ends), strict=True)
-    return np.concatenate([body_stress(body.material, F_body, real, device) for body, F_body in parts])
+    space, F = simulation.space, simulation.stepper.U.F
+    sigma = stresses(space, len(F), simulation.device)
+    for body in simulation.bodies:
+        body_stress(space, body.material, simulation.ranges[body.name], F, sigma)
+    return sigma.numpy().copy()

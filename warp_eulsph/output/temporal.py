@@ -10,14 +10,13 @@ import numpy as np
 from .atomic import replace_file
 from .manifest import Entry
 
-# Particles are vertices 0, 1, 2, ...: the longest list serves all steps, and none depends on another file being there.
 _KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
 def write_index(path: Path, entries: Sequence[Entry]) -> None:
     """Write ``path``, an index of the snapshots ``entries`` beside it, for ParaView (5.12 or newer) and VTK (9.3).
 
-    Fields are those that all snapshots have. A snapshot that is lost later reads as not-a-number.
+    Fields are those of the last snapshot; where one has no such field, or is lost later, it reads as not-a-number.
 
     Args:
         path: of the index, in the run's directory.
@@ -54,19 +53,24 @@ def write_layout(file: Any, counts: np.ndarray, times: Sequence[float], steps: S
         names: fields, whose rows follow each other frame by frame.
     """
     frames, firsts = len(counts), np.cumsum([0, *counts[:-1]]).astype(np.int64)
+    # VTK 9.3 counts one entry of Offsets more for each part before a frame's, so all frames share the first part where
+    # they can, and have parts of their own where numbers of particles change.
+    shared = bool((counts == counts[0]).all())
+    parts, part = (counts[:1], np.zeros(frames, dtype=np.int64)) if shared else (counts, np.arange(frames))
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 2], dtype=np.int64)
     root.attrs["Type"] = np.bytes_("PolyData")
-    root["NumberOfPoints"] = counts
-    _write_cells(root, counts)
+    root["NumberOfPoints"] = parts
+    _write_cells(root, parts)
     table = root.create_group("Steps")
     table.attrs["NSteps"] = np.int64(frames)
     table["Values"] = np.array(times)
-    table["PartOffsets"] = np.arange(frames, dtype=np.int64)
+    table["PartOffsets"] = part
     table["NumberOfParts"] = np.ones(frames, dtype=np.int64)
     table["PointOffsets"] = firsts
-    for name in ("CellOffsets", "ConnectivityIdOffsets"):
-        table[name] = np.zeros((frames, len(_KINDS)), dtype=np.int64)
+    first_cells = np.zeros((frames, len(_KINDS)), dtype=np.int64)
+    first_cells[:, 0] = 0 if shared else firsts
+    table["CellOffsets"] = table["ConnectivityIdOffsets"] = first_cells
     root.create_group("FieldData")["Step"] = np.array(steps, dtype=np.int64)
     _write_offsets(table, "FieldDataOffsets", ["Step"], np.arange(frames, dtype=np.int64))
     root.create_group("PointData")
@@ -74,15 +78,14 @@ def write_layout(file: Any, counts: np.ndarray, times: Sequence[float], steps: S
     return root
 
 
-def _write_cells(root: Any, counts: np.ndarray) -> None:
-    steps, most = len(counts), int(counts.max())
+def _write_cells(root: Any, parts: np.ndarray) -> None:
+    """The particles of each part as vertices 0, 1, 2, …, and no other cells."""
     for kind in _KINDS:
-        group, cells = root.create_group(kind), counts if kind == "Vertices" else np.zeros(steps, dtype=np.int64)
+        group, cells = root.create_group(kind), parts if kind == "Vertices" else np.zeros_like(parts)
         group["NumberOfCells"], group["NumberOfConnectivityIds"] = cells, cells
-        size = most if kind == "Vertices" else 0
-        for name, length in (("Connectivity", size), ("Offsets", size + 1)):
-            ids = np.arange(length, dtype=np.int64)
-            group.create_dataset(name, data=ids, compression="gzip" if length > 1 else None)
+        for name, more in (("Connectivity", 0), ("Offsets", 1)):
+            ids = np.concatenate([np.arange(count + more, dtype=np.int64) for count in cells])
+            group.create_dataset(name, data=ids, compression="gzip" if ids.any() else None)
 
 
 def _write_offsets(steps: Any, group: str, names: Sequence[str], offsets: np.ndarray) -> None:
