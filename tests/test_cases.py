@@ -223,7 +223,7 @@ def test_formulas_act_on_the_device_as_on_the_host(precision):
     ]
     case = parse_case(
         small(
-            parameters={"a": "3*2 - 1"},
+            parameters={"two": 2, "a": "10*two**-1*two**0"},
             boundary=[{"kind": "BodyForce", "value": parts, "material": True}],
             precision=precision,
         )
@@ -502,6 +502,8 @@ def test_all_mistakes_of_a_file_are_named_at_once(tmp_path):
         ({"probe": [{"kind": "BodyProbe", "name": "a"}] * 2}, "probe.1.name: is taken by another, got 'a'"),
         ({"output": {"at": [2, 1]}}, "output.at: times must be finite and increase"),
         ({"precision": "half"}, "precision: input should be 'double' or 'single', got 'half'"),
+        ({"parameters": {"lambda": 3}}, "parameters.lambda: must be named by letters"),
+        ({"parameters": {"a": "b + 1", "b": 2}}, "parameters.a: unknown name 'b'"),
         ({"parameters": 3}, "parameters: input should be a valid dictionary, got 3"),
         ({"time_step": {"fixed": "-1"}}, "time_step: fixed time step must be positive and finite, got -1.0 s"),
     ],
