@@ -13,6 +13,7 @@ import warp as wp
 import warp_eulsph as es
 from warp_eulsph.cases import CaseError, json_schema, parse_case, read_case
 from warp_eulsph.cases.case import SHAPES
+from warp_eulsph.cases.expressions import parse
 from warp_eulsph.cases.options import concrete, writable
 from warp_eulsph.cases.reading import tomllib
 from warp_eulsph.output import Probe, Run, record
@@ -222,7 +223,7 @@ def test_formulas_act_on_the_device_as_on_the_host(precision):
     ]
     case = parse_case(
         small(
-            parameters={"a": "3*2 - 1"},
+            parameters={"two": 2, "a": "10*two**-1*two**0"},
             boundary=[{"kind": "BodyForce", "value": parts, "material": True}],
             precision=precision,
         )
@@ -239,6 +240,66 @@ def test_formulas_act_on_the_device_as_on_the_host(precision):
     expected = np.stack([first, np.where((x < 0.6) & ~(y > 0.9), near, far)], axis=1) * 1000 * 0.25**2
     tolerance = 1e-13 if precision == "double" else 1e-5
     np.testing.assert_allclose(external.numpy(), expected, rtol=0, atol=tolerance * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x.real",
+        "x[0]",
+        "'x'",
+        "f'{x}'",
+        "lambda: 1",
+        "[x for x in y]",
+        "(y := 1)",
+        "x @ y",
+        "x // 2",
+        "x % 2",
+        "x << 1",
+        "x if y else 1",
+        "x == y",
+        "1 < x",
+        "min(*x)",
+        "min(x)",
+        "sin(x, y)",
+        "clip(a=1)",
+        "sin",
+        "print(1)",
+        "True",
+        "None",
+        "1j",
+        "1e999",
+        "9" * 400,
+        "",
+        "x;y",
+        "x\ny",
+        "import os",
+        "-" * 900 + "1",
+        "(" * 500 + "1" + ")" * 500,
+        "x + " * 300 + "x",
+        "\0",
+    ],
+)
+def test_formulas_are_numbers_and_nothing_else(text):
+    with pytest.raises(ValueError, match=r"formula|unknown|number|needed|takes|null"):
+        parse(text, ["x", "y"])
+
+
+def test_noise_in_formulas_is_named_or_evaluates():
+    random = np.random.default_rng(4)
+    words = ["x", "y", "1", "2.5", "pi", "(", ")", "+", "-", "*", "/", "**", "sin(", "min(", ",", "<", "and", "not"]
+    words += ["if", "else", "q", "sqrt(", "clip(", "\t", "'", "."]
+    evaluated = 0
+    for _ in range(3000):
+        text = " ".join(random.choice(words, size=random.integers(1, 9)))
+        try:
+            expression = parse(text, ["x", "y"])
+        except ValueError as error:
+            assert str(error)
+            continue
+        evaluated += 1
+        assert np.shape(expression({"x": np.ones(3), "y": np.zeros(3)})) in ((), (3,))
+    assert evaluated > 100
 
 
 def test_motion_and_traction_and_mirror_from_a_file():
@@ -441,6 +502,8 @@ def test_all_mistakes_of_a_file_are_named_at_once(tmp_path):
         ({"probe": [{"kind": "BodyProbe", "name": "a"}] * 2}, "probe.1.name: is taken by another, got 'a'"),
         ({"output": {"at": [2, 1]}}, "output.at: times must be finite and increase"),
         ({"precision": "half"}, "precision: input should be 'double' or 'single', got 'half'"),
+        ({"parameters": {"lambda": 3}}, "parameters.lambda: must be named by letters"),
+        ({"parameters": {"a": "b + 1", "b": 2}}, "parameters.a: unknown name 'b'"),
         ({"parameters": 3}, "parameters: input should be a valid dictionary, got 3"),
         ({"time_step": {"fixed": "-1"}}, "time_step: fixed time step must be positive and finite, got -1.0 s"),
     ],
@@ -456,6 +519,10 @@ def test_mistakes_that_only_particles_show_are_value_errors():
     case = parse_case(small(boundary=[{"kind": "Fixed", "region": "x > 9"}]))
     with pytest.raises(ValueError, match="the region selects no particle"):
         case.build()
+    data = small()
+    data["body"]["a"]["shape"] = {"kind": "ring", "centre": [0, 0], "inner": 2, "outer": 1, "spacing": 0.1}
+    with pytest.raises(ValueError, match=r"body\.a\.shape: ring: inner must be below outer, got 2.0 and 1.0 m"):
+        parse_case(data).build()
 
 
 def test_unreadable_files_are_named(tmp_path):

@@ -58,7 +58,12 @@ class BodyTable(Table):
 
     def build(self, name: str) -> Body:
         """The body, without ghosts."""
-        x, volume, *surface = self.shape.make()
+        try:
+            x, volume, *surface = self.shape.make()
+        except ValueError as error:
+            raise ValueError(f"body.{name}.shape: {error}") from None
+        except MemoryError:
+            raise ValueError(f"body.{name}.shape: it does not fit into memory; increase the spacing") from None
         return Body(
             x=x,
             volume=volume if self.volume is None else self.volume.at(x)[:, 0],
@@ -78,7 +83,7 @@ class OutputTable(Table):
     at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
     fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
     precision: Precision = Field("single", description="of the stored numbers")
-    log: choice(Schedule) = Field({"kind": "EverySteps", "count": 10}, validate_default=True)  # type: ignore[valid-type]
+    log: choice(Schedule) = Field({"kind": "EverySteps", "count": 16}, validate_default=True)  # type: ignore[valid-type]
     checkpoint: Number = Field(600.0, gt=0.0, description="wall time between checkpoints [s]")
 
     @field_validator("fields")
@@ -138,10 +143,7 @@ class Case(Table):
         bodies, ghosts = [], []
         weight, space = self.weight.make(), self.space
         for name, table in self.body.items():
-            try:
-                body = table.build(name)
-            except MemoryError:
-                raise ValueError(f"body.{name}: its particles do not fit into memory; increase the spacing") from None
+            body = table.build(name)
             for plane in table.mirror:
                 depth = plane.depth
                 if depth is None:

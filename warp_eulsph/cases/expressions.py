@@ -6,6 +6,7 @@ code. The same tree gives numbers on the host (numpy) and a ``wp.func`` on the d
 
 import ast
 import difflib
+import functools
 import linecache
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+
+from ..space import Space
 
 LONGEST = 1000  # characters
 
@@ -231,9 +234,15 @@ def _source(node: ast.AST, values: Mapping[str, float]) -> str:
     raise AssertionError(ast.dump(node))
 
 
-def device_function(expressions: Sequence[Expression], values: Mapping[str, float], space: Any) -> Any:
+def device_function(expressions: Sequence[Expression], values: Mapping[str, float], space: Space) -> Any:
     """``wp.func`` (x, t) -> row of the formulas, in the precision of ``space``; ``values`` are constants by name."""
-    real, vec, row = space.real, space.vec, space.row(len(expressions))
+    return _compiled(tuple(_source(expression.tree, values) for expression in expressions), space)
+
+
+@functools.cache
+def _compiled(parts: tuple[str, ...], space: Space) -> Any:
+    """``wp.func`` of Warp's source of each component; cached, because a new function is a new kernel."""
+    real = space.real
 
     @wp.func
     def smoothstep(s: real) -> real:
@@ -244,12 +253,12 @@ def device_function(expressions: Sequence[Expression], values: Mapping[str, floa
     def sign(s: real) -> real:
         return wp.where(s == real(0.0), real(0.0), wp.sign(s))
 
-    parts = ", ".join(_source(expression.tree, values) for expression in expressions)
-    source = f"def formula(x: vec, t: real):\n    return row({parts})\n"
+    source = f"def formula(x: vec, t: real):\n    return row({', '.join(parts)})\n"
     # Warp reads the source of a function by its file: this one is only in the cache of files.
     file = f"<formula {source!r} {space!r}>"
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    scope: dict[str, Any] = {"wp": wp, "real": real, "vec": vec, "row": row, "smoothstep": smoothstep, "sign": sign}
+    scope: dict[str, Any] = {"wp": wp, "smoothstep": smoothstep, "sign": sign}
+    scope |= {"real": real, "vec": space.vec, "row": space.row(len(parts))}
     exec(compile(source, file, "exec"), scope)
     return wp.func(scope["formula"])
 

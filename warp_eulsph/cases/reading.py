@@ -1,6 +1,7 @@
 """Case files read: TOML, overrides, and every mistake of a file named at once."""
 
 import copy
+import keyword
 import sys
 from collections.abc import Sequence
 from os import PathLike
@@ -124,7 +125,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], list[str]]:
     problems: list[str] = []
     for name, value in given.items() if isinstance(given, dict) else ():
         path = f"parameters.{name}"
-        if not name.isidentifier() or name in (*COORDINATES, "t", "pi", *FUNCTIONS):
+        if not name.isidentifier() or keyword.iskeyword(name) or name in (*COORDINATES, "t", "pi", *FUNCTIONS):
             problems.append(f"{path}: must be named by letters, digits and _, and not like a coordinate or function")
         elif isinstance(value, str):
             try:
@@ -134,7 +135,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], list[str]]:
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e300:
             problems.append(f"{path}: must be a finite number or a formula of the parameters above it, got {value!r}")
         else:
-            parameters[name] = value
+            parameters[name] = float(value)
         if name.isidentifier() and name not in COORDINATES:
             parameters.setdefault(name, 1.0)  # so that formulas with a wrong one are not wrong too
     return parameters, problems
