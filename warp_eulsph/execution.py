@@ -15,8 +15,8 @@ from typing import Any
 
 import warp as wp
 
-# Below this many particles a range costs less than handing it to a thread (about 20 µs).
-LEAST_RANGE = 512
+# Below this many particles a pointwise kernel takes less time than handing it to a thread (some 20 µs).
+LEAST_RANGE = 2048
 # More ranges than threads, so that a core that is busy elsewhere takes fewer of them.
 RANGES_PER_THREAD = 4
 # Launches that an object repeats are a few dozen; arguments that are made anew each time must not pile up.

@@ -36,10 +36,11 @@ _LOOK = """
     const T reach = T(0.5) * support * (h_a + frame.data[6]) * T(MARGIN);
     const int* side = sides.data;
     auto clamped = [](T x, int most) { x = x > 0 ? x : T(0); return x < T(most) ? (int)x : most; };
-    auto outside = [&](T x, int i, int c) {  // distance of x from slab c of axis i, squared
-        const T low = T(c) - (x - frame.data[i]) * rate[i], high = -low - 1;
-        const T out = (low > high ? low : high) / rate[i];
-        return out > 0 ? out * out : T(0);
+    // distance of x from slab c of axis i, squared; the outermost slabs have no end
+    auto outside = [&](T x, int i, int c) {
+        const T along = (x - frame.data[i]) * rate[i], below = T(c) - along, above = along - T(c + 1);
+        const T out = c > 0 && below > 0 ? below : c < side[i] - 1 && above > 0 ? above : T(0);
+        return out * out / (rate[i] * rate[i]);
     };
     auto look = [&](const T* p) __attribute__((always_inline)) {
         int c0[3], c1[3];

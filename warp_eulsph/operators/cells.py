@@ -17,6 +17,7 @@ from .cell_search import MARGIN, make_search
 # Candidates are read eight at a time, beyond the last one too.
 SPARE = 8
 CELLS_PER_PARTICLE = 4
+TRIMS = 6
 # Along x, y, z: wide columns, short cells along them, so that few columns are opened and few candidates are in vain.
 CELLS_PER_SUPPORT = (1, 1, 3)
 
@@ -26,38 +27,59 @@ def _make_frame(space: Space) -> Any:
     """Kernel of one thread: the box around the places, and cells that fill it.
 
     ``frame`` becomes (origin x, y, z; cells per metre along x, y, z; largest h), ``sides`` the number of cells along
-    each axis: at most ``most`` altogether, wider ones if need be.
+    each axis, at most ``most`` altogether. Where the box would need more, because fragments fly far away, it is drawn
+    around the bulk: what lies within two standard deviations, several times over; the outermost cells take the rest.
     """
     real = space.real
     vec3 = wp.types.vector(length=3, dtype=real)
     divisions = ", ".join(map(str, CELLS_PER_SUPPORT))
     snippet = f"""
     {prelude(Space(space.dim, space.real))}
-    T low[3], high[3], longest = 0;
-    for (int i = 0; i < 3; ++i) low[i] = high[i] = place.data[0].c[i];
-    for (int a = 0; a < n; ++a) {{
-        for (int i = 3 - dim; i < 3; ++i) {{
-            T x = place.data[a].c[i];
-            low[i] = x < low[i] ? x : low[i];
-            high[i] = x > high[i] ? x : high[i];
-        }}
-        longest = h.data[a] > longest ? h.data[a] : longest;
-    }}
+    T longest = 0;
+    for (int a = 0; a < n; ++a) longest = h.data[a] > longest ? h.data[a] : longest;
     T rate[3], divisions[3] = {{{divisions}}};
     for (int i = 0; i < 3; ++i) rate[i] = divisions[i] / (T({MARGIN}) * support * longest);
-    int count[3] = {{1, 1, 1}};
-    for (int tries = 0; tries < 100; ++tries) {{
+    T from[3], to[3], low[3], high[3];
+    for (int i = 0; i < 3; ++i) {{ from[i] = -__builtin_huge_val(); to[i] = __builtin_huge_val(); }}
+    int count[3];
+    auto cells = [&]() {{
         double all = 1;
         for (int i = 0; i < 3; ++i) {{
-            T cells = (high[i] - low[i]) * rate[i];
-            count[i] = cells < T(1 << 20) ? (int)cells + 1 : 1 << 20;
+            const T along = (high[i] - low[i]) * rate[i];
+            count[i] = along < T(1 << 20) ? (int)along + 1 : 1 << 20;
             all *= count[i];
         }}
-        if (all <= most) break;
-        for (int i = 0; i < 3; ++i) {{ count[i] = 1; rate[i] *= T(0.5); }}
+        return all;
+    }};
+    for (int trims = 0;; ++trims) {{
+        double sum[3] = {{0, 0, 0}}, squares[3] = {{0, 0, 0}}, inside = 0;
+        for (int i = 0; i < 3; ++i) {{ low[i] = to[i]; high[i] = from[i]; }}
+        for (int a = 0; a < n; ++a) {{
+            const T* x = place.data[a].c;
+            bool within = true;
+            for (int i = 3 - dim; i < 3; ++i) within = within && x[i] >= from[i] && x[i] <= to[i];
+            if (!within) continue;
+            inside += 1;
+            for (int i = 3 - dim; i < 3; ++i) {{
+                low[i] = x[i] < low[i] ? x[i] : low[i];
+                high[i] = x[i] > high[i] ? x[i] : high[i];
+                sum[i] += x[i];
+                squares[i] += double(x[i]) * x[i];
+            }}
+        }}
+        for (int i = 0; i < 3 - dim; ++i) low[i] = high[i] = 0;
+        if (cells() <= most || trims == {TRIMS}) break;
+        for (int i = 3 - dim; i < 3; ++i) {{
+            const double mean = sum[i] / inside, variance = squares[i] / inside - mean * mean;
+            const T reach = 2 * __builtin_sqrt(variance > 0 ? variance : 0);
+            from[i] = T(mean) - reach;
+            to[i] = T(mean) + reach;
+        }}
     }}
-    for (int i = 0; i < 3; ++i) {{ frame.data[i] = low[i]; sides.data[i] = count[i]; }}
-    for (int i = 0; i < 3; ++i) frame.data[3 + i] = rate[i];
+    for (int tries = 0; tries < 100 && cells() > most; ++tries)
+        for (int i = 0; i < 3; ++i) rate[i] *= T(0.5);
+    if (!(cells() <= most)) count[0] = count[1] = count[2] = 1;  // places that are no numbers
+    for (int i = 0; i < 3; ++i) {{ frame.data[i] = low[i]; frame.data[3 + i] = rate[i]; sides.data[i] = count[i]; }}
     frame.data[6] = longest;
     """
 

@@ -59,8 +59,9 @@ def _make_forces(space: Space) -> Any:
         balanced = "P[3] - image_box[j] * __builtin_rint(P[3] * image_rate[j])"
     snippet = f"""
     {prelude(space)}
+    constexpr int vectors = {_vectors(space)};
     const V* const all = (const V*)rows.data;
-    const V* const A = all + (size_t)a * (2 + 2 * dim);
+    const V* const A = all + (size_t)a * vectors;
     const V x_a = A[0], v_a = A[1];
     V grad_a[dim], Pi_a[dim], internal = 0, dissipation = 0;
     #pragma unroll
@@ -73,7 +74,7 @@ def _make_forces(space: Space) -> Any:
         V xi[4], jump[4], squares[4], along[4], Z, Z_shear;
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
-            const V* const B = all + (size_t)b[i] * (2 + 2 * dim);
+            const V* const B = all + (size_t)b[i] * vectors;
             xi[i] = nearest(B[0] - x_a);
             Z[i] = B[0][3];
             Z_shear[i] = B[1][3];
