@@ -6,8 +6,6 @@ import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-from warp_eulsph.operators.divergence import make_divergence
-from warp_eulsph.operators.gradient import make_gradient
 from warp_eulsph.scheme.balance import tension
 from warp_eulsph.validation.stability_step import Point, Step
 
@@ -32,10 +30,10 @@ def disordered(dim, correction, dtype=wp.float64, n=None):
 def dual_forces(simulation, Q):
     """M5 of the stresses Q on the present reference."""
     stepper, space = simulation.stepper, simulation.space
-    reference, near = stepper.configuration.fields, stepper.configuration.near
+    reference = stepper.configuration.fields
     Pi, out = (wp.zeros(stepper.n, dtype=dtype, device=stepper.device) for dtype in (space.mat, space.vec))
     Pi.assign(Q @ np.swapaxes(reference.L.numpy(), 1, 2))
-    wp.launch(make_divergence(space), stepper.n, [reference, near, Pi, out], device=stepper.device)
+    stepper.configuration.divergence(Pi, out)
     return out.numpy()
 
 
@@ -44,8 +42,7 @@ def gradient(simulation, f):
     stepper, space = simulation.stepper, simulation.space
     rows = wp.array(f.astype(space.numpy), dtype=space.vec, device=stepper.device)
     out = wp.zeros(stepper.n, dtype=space.mat, device=stepper.device)
-    reference, near = stepper.configuration.fields, stepper.configuration.near
-    wp.launch(make_gradient(space, space.dim), stepper.n, [reference, near, rows, out], device=stepper.device)
+    stepper.configuration.gradient(rows, out)
     return out.numpy()
 
 

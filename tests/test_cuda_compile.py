@@ -1,10 +1,15 @@
-"""Every kernel that a step launches compiles for CUDA, without a GPU: Warp's ahead-of-time compiler needs no driver."""
+"""Every kernel that a step launches compiles for CUDA and spills no register.
+
+No GPU: Warp's ahead-of-time compiler needs no driver. ``-s`` prints the registers of each kernel.
+"""
 
 import numpy as np
 import pytest
 import warp as wp
+from cubin import usage
 
 import warp_eulsph as es
+from warp_eulsph import execution
 
 CASES = [
     pytest.param(3, wp.float32, 90),
@@ -15,7 +20,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("dim", "dtype", "arch"), CASES)
-def test_kernels_of_an_eulerian_step_compile(dim, dtype, arch, monkeypatch, tmp_path):
+def test_kernels_of_an_eulerian_step_compile_and_do_not_spill(dim, dtype, arch, monkeypatch, tmp_path):
     launched = {}
     launch = wp.launch
 
@@ -24,19 +29,24 @@ def test_kernels_of_an_eulerian_step_compile(dim, dtype, arch, monkeypatch, tmp_
         return launch(kernel, *args, **kwargs)
 
     monkeypatch.setattr(wp, "launch", recording_launch)
+    monkeypatch.setattr(execution, "_simd", False)  # the portable kernels, which GPUs run
     s = (np.arange(5) + 0.5) / 5
     x = np.stack(np.meshgrid(*[s] * dim, indexing="ij"), -1).reshape(-1, dim)
     material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
-    simulation = es.Simulation(
-        es.Body(x=x, volume=5.0**-dim, material=material),
-        boundaries=[es.Fixed(lambda X: X[:, 0] < 0.2)],
-        scheme=es.LaxWendroff(smoothing=es.LinearExact()),
-        dtype=dtype,
-    )
-    simulation.step(2)
-    simulation.energy()
-    simulation.momentum()
-    assert len(launched) > 20
+    body, fixed = es.Body(x=x, volume=5.0**-dim, material=material), es.Fixed(lambda X: X[:, 0] < 0.2)
+    for scheme in (es.Verlet(), es.LaxWendroff(smoothing=es.LinearExact())):
+        simulation = es.Simulation(body, boundaries=[fixed], scheme=scheme, dtype=dtype)
+        simulation.step(2)
+        simulation.energy()
+        simulation.momentum()
+    assert len(launched) > 25
+    found = {}
     for module in launched.values():
-        wp.compile_aot_module(module, arch=arch, module_dir=tmp_path)
-    assert len(list(tmp_path.glob("*.ptx")) + list(tmp_path.glob("*.cubin"))) == len(launched)
+        (path,) = wp.compile_aot_module(module, arch=arch, module_dir=tmp_path, use_ptx=False)
+        found |= usage(path)
+    kernels = {name: kernel for name, kernel in found.items() if not name.startswith("$")}  # others are subroutines
+    for name, kernel in sorted(kernels.items(), key=lambda item: -item[1].registers):
+        print(f"{kernel.registers:4d} registers, {kernel.frame} bytes of local memory: {name}")
+    assert len(kernels) >= len(launched)
+    assert all(kernel.registers > 0 for kernel in kernels.values())
+    assert not {name: function.frame for name, function in found.items() if function.frame}

@@ -12,19 +12,20 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg"},
+    {"space", "linalg", "execution", "atomics", "simd"},
     {"fields", "weights", "materials", "boundaries", "reduce"},
     {"operators"},
     {"scheme", "contact"},
     {"simulation", "schedule", "diagnostics", "output", "geometry"},
-    {"validation"},
+    {"validation", "bench"},
     {"cases", "cli", "__main__"},
 ]
 LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 # The front door shows rooms up to the simulation: those above may come in by it.
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
-FRONT_ENDS = {"validation/command.py", "validation/step_cost.py"}  # what the command line prints is its result
+# What the command line prints is its result
+FRONT_ENDS = {"bench/command.py", "bench/equal_error.py", "validation/command.py", "validation/step_cost.py"}
 
 
 def room(path):

@@ -7,8 +7,6 @@ from clouds import cloud, configuration_of
 from scipy.spatial import cKDTree
 
 from warp_eulsph import CubicSpline, Space
-from warp_eulsph.operators.divergence import make_divergence
-from warp_eulsph.operators.gradient import make_gradient
 from warp_eulsph.operators.neighbours import NeighbourLists
 from warp_eulsph.operators.smoothing import make_linear_exact
 
@@ -40,8 +38,7 @@ def gradient(configuration, f):
     """∇f by M4: (n, c) -> (n, c, dim)."""
     space, (n, components) = configuration.space, f.shape
     out = wp.zeros(n, dtype=space.row_gradient(components), device="cpu")
-    arguments = [configuration.fields, configuration.near, rows_of(f, configuration), out]
-    wp.launch(make_gradient(space, components), n, arguments, device="cpu")
+    configuration.gradient(rows_of(f, configuration), out)
     return out.numpy().astype(float)
 
 
@@ -51,7 +48,7 @@ def divergence(configuration, Q):
     L = configuration.fields.L.numpy().astype(float)
     Pi = wp.array((Q @ L).astype(space.numpy), dtype=space.mat, device="cpu")
     out = wp.zeros(n, dtype=space.vec, device="cpu")
-    wp.launch(make_divergence(space), n, [configuration.fields, configuration.near, Pi, out], device="cpu")
+    configuration.divergence(Pi, out)
     return -out.numpy().astype(float)
 
 

@@ -7,7 +7,6 @@ from clouds import cloud, configuration_of, cubic, dense_N
 
 from warp_eulsph import Space
 from warp_eulsph.fields import allocate
-from warp_eulsph.operators.gradient import make_gradient
 from warp_eulsph.operators.second_derivative import make_second_derivative
 from warp_eulsph.operators.values import Linear, Shepard
 from warp_eulsph.scheme.smoothing import NeighbourAverage
@@ -94,7 +93,7 @@ def second_derivative(configuration, f):
     gradient = wp.zeros(n, dtype=space.row_gradient(components), device="cpu")
     out = wp.zeros_like(field)
     structs = [configuration.fields, configuration.near]
-    wp.launch(make_gradient(space, components), n, [*structs, field, gradient], device="cpu")
+    configuration.gradient(field, gradient)
     wp.launch(make_second_derivative(space, components), n, [*structs, field, gradient, out], device="cpu")
     return out.numpy().copy(), gradient.numpy().reshape(n, components, space.dim).copy()
 

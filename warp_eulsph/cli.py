@@ -24,6 +24,15 @@ def _parser() -> argparse.ArgumentParser:
     validate.add_argument("--json", action="store_true", help="print a JSON list and nothing else")
     validate.add_argument("--list", action="store_true", help="print names, titles and sources of the cases, run none")
     validate.set_defaults(run=_validate)
+    bench = commands.add_parser(
+        "bench",
+        help="time steps against the machine's own limits",
+        description="Time steps against the machine's own limits. Exit status: 0 done, 2 no such case.",
+    )
+    bench.add_argument("-k", default="", metavar="NAME", help="cases whose name contains this; all by default")
+    bench.add_argument("--json", action="store_true", help="print a JSON list and nothing else")
+    bench.add_argument("--start-up", action="store_true", help="time the start of a process too, cold and warm")
+    bench.set_defaults(run=_bench)
     return parser
 
 
@@ -34,3 +43,9 @@ def _validate(args: argparse.Namespace) -> int:
     from .validation.command import validate
 
     return validate(args.names, quick=args.quick, as_json=args.json, listing=args.list)
+
+
+def _bench(args: argparse.Namespace) -> int:
+    from .bench.command import bench
+
+    return bench(args.k, as_json=args.json, start_up=args.start_up)

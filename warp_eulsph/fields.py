@@ -43,6 +43,7 @@ REFERENCE = {
     "L": Field("mat", "-", "gradient correction (M3), not symmetric where positions are balanced (M13)"),
     "F": Field("mat", "-", "deformation gradient of the reference, F_k"),
     "row": Field("real", "kg/m^(d+2)", "sum of m_b g_ab over the neighbours (M7)"),
+    "diagonal": Field("real", "1/m^2", "sum of V_b g_ab over the neighbours, of the graph Laplacian (M13)"),
 }
 FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
@@ -88,15 +89,15 @@ def allocate(space: Space, group: str, n: int, device: Any) -> Any:
 def neighbour_structure(space: Space) -> Any:
     """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.
 
-    ``g`` is the pair weight g_ab = −W'(r)/r [1/m^(d+2)], so that ∇W_ab = g_ab (x_b − x_a); ``box`` [m] holds the
-    lengths of the periodic box, zero where it is open.
+    ``w`` is V_b g_ab [1/m²] with g_ab = −W'(r)/r, so that V_b ∇W_ab = w_ab (x_b − x_a); ``box`` [m] holds the lengths
+    of the periodic box, zero where it is open.
     """
 
     @wp.struct
     class Neighbours:
         start: wp.array(dtype=wp.int32)
         index: wp.array(dtype=wp.int32)
-        g: wp.array(dtype=space.real)
+        w: wp.array(dtype=space.real)
         box: space.vec
 
     return Neighbours

@@ -5,6 +5,8 @@ from typing import Any
 
 import warp as wp
 
+from .execution import Launcher
+
 BLOCKS = 256
 
 
@@ -50,9 +52,9 @@ class Sum:
 
     def __init__(self, dtype: Any, device: Any):
         self.partial = wp.zeros(BLOCKS, dtype=dtype, device=device)
-        self.dtype, self.device = dtype, device
+        self.dtype, self._launch = dtype, Launcher(device)
 
     def __call__(self, values: wp.array, out: wp.array) -> None:
         """``out[0]`` ← Σ values."""
-        wp.launch(_make_partial(self.dtype), BLOCKS, [values, len(values), self.partial], device=self.device)
-        wp.launch(_make_final(self.dtype), 1, [self.partial, out], device=self.device)
+        self._launch.once(_make_partial(self.dtype), BLOCKS, [values, len(values), self.partial])
+        self._launch.once(_make_final(self.dtype), 1, [self.partial, out])

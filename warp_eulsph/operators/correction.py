@@ -7,6 +7,7 @@ import warp as wp
 
 from ..fields import neighbour_structure, structure
 from ..linalg import inverse, symmetric_bounds, symmetric_eigen
+from ..simd import prelude
 from ..space import Space, difference
 from ..weights import Weight
 from ..weights.base import pair_weight
@@ -18,7 +19,7 @@ CUTOFF = 0.02
 
 @functools.cache
 def make_pair_sums(weight: Weight, space: Space) -> Any:
-    """Kernel: g_ab of every pair, K_a = Σ V_b g ξ⊗ξ (M3, ξ = x_b − x_a) and the mass sum of M7."""
+    """Kernel: w_ab = V_b g_ab of every pair, its sum, K_a = Σ w ξ⊗ξ (M3, ξ = x_b − x_a) and the mass sum of M7."""
     real, mat = space.real, space.mat
     Particles, Reference, Neighbours = (
         structure(space, "Particles"),
@@ -28,23 +29,114 @@ def make_pair_sums(weight: Weight, space: Space) -> Any:
     separation, g_of = difference(space), pair_weight(weight, space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def pair_sums(particles: Particles, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
-        a = wp.tid()
+    def pair_sums(first: int, particles: Particles, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
+        a = first + wp.tid()
         x_a = reference.x[a]
         h_a = reference.h[a]
         K_a = mat()
         row = real(0.0)
+        diagonal = real(0.0)
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
             g = g_of(wp.length(xi), real(0.5) * (h_a + reference.h[b]))
-            near.g[k] = g
-            K_a += wp.outer(xi, xi) * (reference.V[b] * g)
+            w = reference.V[b] * g
+            near.w[k] = w
+            K_a += wp.outer(xi, xi) * w
             row += particles.mass[b] * g
+            diagonal += w
         K[a] = K_a
         reference.row[a] = row
+        reference.diagonal[a] = diagonal
 
     return pair_sums
+
+
+@functools.cache
+def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
+    """SIMD kernel of ``make_pair_sums``."""
+    real, vec, mat = space.real, space.vec, space.mat
+    Particles, Reference, Neighbours = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        neighbour_structure(space),
+    )
+    sigma = weight.sigma[space.dim - 1]
+    snippet = f"""
+    {prelude(space)}
+    auto slope = [](V q) __attribute__((always_inline)) {{ return {weight.slope_cpp}; }};
+    const V x_a = load(x.data[a].c);
+    const T h_a = h.data[a];
+    V sums[dim * dim], row = 0, diagonal = 0;
+    #pragma unroll
+    for (int i = 0; i < dim * dim; ++i) sums[i] = 0;
+    auto four = [&](int k, int many) __attribute__((always_inline)) {{
+        V p[4], xi[4], h_ab = 0, V_b = 0, m_b = 0;
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) {{
+            const int b = i < many ? index.data[k + i] : a;
+            p[i] = nearest(load(x.data[b].c) - x_a);
+            h_ab[i] = T(0.5) * (h_a + h.data[b]);
+            V_b[i] = i < many ? volume.data[b] : 0;
+            m_b[i] = i < many ? mass.data[b] : 0;
+        }}
+        turn(p, xi);
+        V rr = 0;
+        #pragma unroll
+        for (int i = 0; i < dim; ++i) rr += xi[i] * xi[i];
+        const V rate = 1 / h_ab, q = __builtin_elementwise_sqrt(rr) * rate;
+        V g = slope(q) * T({sigma!r});
+        #pragma unroll
+        for (int i = 0; i < dim + 2; ++i) g *= rate;
+        g = q < T({weight.support!r}) ? g : (V)0;
+        const V w_ab = g * V_b;
+        if (many == 4) __builtin_memcpy(w.data + k, &w_ab, sizeof(V));
+        else for (int i = 0; i < many; ++i) w.data[k + i] = w_ab[i];
+        #pragma unroll
+        for (int i = 0; i < dim; ++i) for (int j = 0; j <= i; ++j) sums[i * dim + j] += xi[i] * xi[j] * w_ab;
+        row += g * m_b;
+        diagonal += w_ab;
+    }};
+    int k = begin;
+    for (; k + 4 <= end; k += 4) four(k, 4);
+    if (k < end) four(k, end - k);
+    auto sum = [](V v) {{ return (v[0] + v[1]) + (v[2] + v[3]); }};
+    #pragma unroll
+    for (int i = 0; i < dim; ++i) for (int j = 0; j <= i; ++j)
+        K.data[a].data[i][j] = K.data[a].data[j][i] = sum(sums[i * dim + j]);
+    rows.data[a] = sum(row);
+    diagonals.data[a] = sum(diagonal);
+    """
+
+    @wp.func_native(snippet)
+    def weigh(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        box: vec,
+        x: wp.array(dtype=vec),
+        h: wp.array(dtype=real),
+        volume: wp.array(dtype=real),
+        mass: wp.array(dtype=real),
+        K: wp.array(dtype=mat),
+        rows: wp.array(dtype=real),
+        diagonals: wp.array(dtype=real),
+    ): ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pair_sums_simd(
+        first: int, particles: Particles, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)
+    ):
+        a = first + wp.tid()
+        begin, end = near.start[a], near.start[a + 1]
+        x, h, V = reference.x, reference.h, reference.V
+        weigh(
+            a, begin, end, near.index, near.w, near.box, x, h, V, particles.mass, K, reference.row, reference.diagonal
+        )
+
+    return pair_sums_simd
 
 
 @functools.cache
@@ -77,8 +169,8 @@ def make_correct(space: Space) -> Any:
     invert, bounds, eigen = corrected_inverse(space), symmetric_bounds(space), symmetric_eigen(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correct(K: wp.array(dtype=mat), reference: Reference, poor: wp.array(dtype=wp.int32)):
-        a = wp.tid()
+    def correct(first: int, K: wp.array(dtype=mat), reference: Reference, poor: wp.array(dtype=wp.int32)):
+        a = first + wp.tid()
         reference.L[a] = invert(K[a])
         lacking = int(0)
         if bounds(K[a])[0] < real(CUTOFF):

@@ -7,28 +7,47 @@ import warp as wp
 
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
+from .row_sums import outer_sum
 
 
 @functools.cache
-def make_gradient(space: Space, components: int) -> Any:
+def make_gradient(space: Space, components: int, simd: bool = False) -> Any:
     """Kernel: ∇f_a = Σ_b V_b g_ab (f_b − f_a) ⊗ ξ L_a, for rows f of ``components`` reals (M4).
 
-    ξ joins the balanced positions of the particles (M13), their positions where nothing is balanced.
+    ξ joins the balanced positions of the particles (M13), their positions where nothing is balanced. ``simd`` has a
+    meaning for rows of ``dim`` reals only.
     """
     row, row_gradient = space.row(components), space.row_gradient(components)
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     separation = difference(space)
+    if components == space.dim:
+        sum_of = outer_sum(space, simd, of_positions=False)
+
+        @wp.kernel(module="unique", enable_backward=False)
+        def vector_gradient(
+            first: int,
+            reference: Reference,
+            near: Neighbours,
+            f: wp.array(dtype=row),
+            out: wp.array(dtype=row_gradient),
+        ):
+            a = first + wp.tid()
+            out[a] = sum_of(a, near, f, reference.balanced) @ reference.L[a]
+
+        return vector_gradient
 
     @wp.kernel(module="unique", enable_backward=False)
-    def gradient(reference: Reference, near: Neighbours, f: wp.array(dtype=row), out: wp.array(dtype=row_gradient)):
-        a = wp.tid()
+    def gradient(
+        first: int, reference: Reference, near: Neighbours, f: wp.array(dtype=row), out: wp.array(dtype=row_gradient)
+    ):
+        a = first + wp.tid()
         x_a = reference.balanced[a]
         f_a = f[a]
         sums = row_gradient()
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.balanced[b], x_a, near.box)
-            sums += wp.outer(f[b] - f_a, xi * (reference.V[b] * near.g[k]))
+            sums += wp.outer(f[b] - f_a, xi * near.w[k])
         out[a] = sums @ reference.L[a]
 
     return gradient

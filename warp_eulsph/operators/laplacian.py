@@ -32,7 +32,7 @@ def _make_apply(space: Space) -> Any:
         weights = real(0.0)
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
-            omega = reference.V[b] * near.g[k]
+            omega = near.w[k]
             weights += omega
             total += (f_a - f[b]) * omega
         out[a] = total * reference.V[a]

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher, simd
 from ..fields import neighbour_structure
 from ..space import Space, difference
 from ..weights import Weight
+from .cells import Cells
 
 log = logging.getLogger(__name__)
 
@@ -18,19 +20,20 @@ QUERY_MARGIN = 1.001
 
 
 @functools.cache
-def _make_pad(space: Space) -> Any:
-    """Kernel: positions as the 3-vectors that HashGrid takes, wrapped into the periodic box."""
+def _make_pad(space: Space, first_component: int) -> Any:
+    """Kernel: positions as components of 3-vectors from ``first_component`` on, wrapped into the periodic box."""
     real, vec, dim = space.real, space.vec, space.dim
     vec3 = wp.types.vector(length=3, dtype=real)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def pad(x: wp.array(dtype=vec), box: vec, out: wp.array(dtype=vec3)):
-        a = wp.tid()
+    def pad(first: int, x: wp.array(dtype=vec), box: vec, out: wp.array(dtype=vec3)):
+        a = first + wp.tid()
         p = vec3()
         for i in range(wp.static(dim)):
-            p[i] = x[a][i]
+            along = x[a][i]
             if box[i] > real(0.0):
-                p[i] = p[i] - box[i] * wp.floor(p[i] / box[i])
+                along = along - box[i] * wp.floor(along / box[i])
+            p[i + first_component] = along
         out[a] = p
 
     return pad
@@ -48,6 +51,7 @@ def _make_search(space: Space, fill: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def search(
+        first_a: int,
         grid: wp.uint64,
         padded: wp.array(dtype=vec3),
         x: wp.array(dtype=vec),
@@ -60,7 +64,7 @@ def _make_search(space: Space, fill: bool) -> Any:
         start: wp.array(dtype=wp.int32),
         index: wp.array(dtype=wp.int32),
     ):
-        a = wp.tid()
+        a = first_a + wp.tid()
         reach = support * real(0.5) * (h[a] + h_max) * real(QUERY_MARGIN)
         n = int(0)
         row = int(0)
@@ -119,19 +123,22 @@ class NeighbourLists:
     """
 
     def __init__(self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any):
-        self.space, self.device = space, device
+        self.space, self.device, self._launch = space, device, Launcher(device)
         self.h, self.body, self.box = h, body, space.vec(*box)
         n = len(h)
         self.support = weight.support
-        side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
-        self.grid = wp.HashGrid(
-            side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
-        )
+        self.cells = Cells(space, self.support, h, body, self.box, device) if simd(device) else None
+        if self.cells is None:
+            side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
+            self.grid = wp.HashGrid(
+                side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
+            )
         self.padded = wp.zeros(n, dtype=wp.types.vector(length=3, dtype=space.real), device=device)
         self.count = wp.zeros(n + 1, dtype=wp.int32, device=device)
         self.rows = neighbour_structure(space)()
         self.rows.box = self.box
         self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self._builds = 0
         self._reserve(0)
 
     @property
@@ -155,26 +162,36 @@ class NeighbourLists:
                 )
 
     def _reserve(self, pairs: int) -> None:
+        self._launch.forget()
         self.rows.index = wp.zeros(pairs, dtype=wp.int32, device=self.device)
-        self.rows.g = wp.zeros(pairs, dtype=self.space.real, device=self.device)
+        self.rows.w = wp.zeros(pairs, dtype=self.space.real, device=self.device)
 
     def build(self, x: wp.array) -> None:
-        """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.g`` is left to be computed."""
-        n = len(x)
-        self._measure()
-        wp.launch(_make_pad(self.space), n, [x, self.box, self.padded], device=self.device)
-        cell = self.support * self.h_max * QUERY_MARGIN
-        self.grid.build(self.padded, cell, groups=self.body)
-        self._launch(x, fill=False)
+        """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.w`` is left to be computed."""
+        if self.cells is None or self.space.periodic:
+            self._measure()
+        last = 0 if self.cells is None else 3 - self.space.dim
+        self._launch(_make_pad(self.space, last), len(x), [x, self.box, self.padded])
+        if self.cells is None:
+            self.grid.build(self.padded, self.support * self.h_max * QUERY_MARGIN, groups=self.body)
+        else:
+            self.cells.sort(self.padded)
+        scratch = self.rows.w
+        self._search(x, scratch, fill=False)
         wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
         pairs = self.pairs
-        if pairs > self.capacity:
-            # A quarter more than needed, so that a moving reference grows its lists seldom.
-            self._reserve(pairs + pairs // 4)
+        # Exactly what the first configuration needs, which may be the only one; from the second on a quarter more than
+        # needed, so that a moving reference grows its lists seldom.
+        if pairs > self.capacity or self._builds == 1:
+            self._reserve(pairs + (pairs // 4 if self._builds else 0))
             log.debug("neighbour lists grew to %d pairs", self.capacity)
-        self._launch(x, fill=True)
+        self._search(x, scratch, fill=True)
+        self._builds += 1
 
-    def _launch(self, x: wp.array, fill: bool) -> None:
+    def _search(self, x: wp.array, scratch: wp.array, fill: bool) -> None:
+        if self.cells is not None:
+            self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, scratch, fill)
+            return
         arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self.h_max]
         arguments += [self.count, self.rows.start, self.rows.index]
-        wp.launch(_make_search(self.space, fill), len(x), arguments, device=self.device)
+        self._launch(_make_search(self.space, fill), len(x), arguments)

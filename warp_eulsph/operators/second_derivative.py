@@ -38,9 +38,8 @@ def make_second_derivative(space: Space, components: int) -> Any:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
-            Vg = reference.V[b] * near.g[k]
-            sums += (f[b] - f_a - gradient_a @ xi) * Vg
-            trace += Vg * wp.dot(xi, xi)
+            sums += (f[b] - f_a - gradient_a @ xi) * near.w[k]
+            trace += near.w[k] * wp.dot(xi, xi)
         curvature = row()
         if trace > real(0.0):
             curvature = sums * (real(2.0) * real(d) / trace)

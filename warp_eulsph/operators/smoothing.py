@@ -42,7 +42,7 @@ def make_linear_exact(space: Space, components: int) -> Any:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
-            omega = particles.mass[b] * near.g[k] / wp.max(row_a, reference.row[b])
+            omega = particles.mass[b] / reference.V[b] * near.w[k] / wp.max(row_a, reference.row[b])
             change += (f[b] - f_a - (gradient_a + gradient[b]) @ (xi * real(0.5))) * omega
         out[a] = f_a + change * theta
 

@@ -9,7 +9,8 @@ import warp as wp
 
 from ..fields import neighbour_structure, structure
 from ..linalg import det, inverse
-from ..space import Space, difference
+from ..operators.row_sums import laplacian_sum, outer_sum
+from ..space import Space
 from .dissipation import UpwindForces
 from .flux import Flux
 from .reference import Configuration
@@ -72,8 +73,8 @@ def _make_renew(space: Space) -> Any:
     Reference = structure(space, "Reference")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def renew(reference: Reference, defect: wp.array(dtype=vec), surface: wp.array(dtype=vec)):
-        a = wp.tid()
+    def renew(first: int, reference: Reference, defect: wp.array(dtype=vec), surface: wp.array(dtype=vec)):
+        a = first + wp.tid()
         if wp.length(defect[a]) > real(OPENED) * wp.pow(reference.V[a], real(face)):
             surface[a] = surface[a] + defect[a]
             defect[a] = vec()
@@ -82,17 +83,20 @@ def _make_renew(space: Space) -> Any:
 
 
 @functools.cache
-def _make_relax(space: Space) -> Any:
+def _make_relax(space: Space, simd: bool, start: bool) -> Any:
     """Kernel: one sweep of damped Jacobi on Σ_b ω_ab (ψ_a − ψ_b) = K_a d_a, ω_ab = V_a V_b g_ab (M13).
 
-    K_a, because the force of shifted positions comes multiplied by L = K⁻¹.
+    K_a, because the force of shifted positions comes multiplied by L = K⁻¹. With ``start`` the sweep is the first, from
+    ψ = 0, whose sums are zero.
     """
     real, vec, mat = space.real, space.vec, space.mat
     relaxation = RELAXATION[space.dim]
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+    sum_of = laplacian_sum(space, simd)
 
     @wp.kernel(module="unique", enable_backward=False)
     def relax(
+        first: int,
         reference: Reference,
         near: Neighbours,
         K: wp.array(dtype=mat),
@@ -100,17 +104,14 @@ def _make_relax(space: Space) -> Any:
         psi: wp.array(dtype=vec),
         out: wp.array(dtype=vec),
     ):
-        a = wp.tid()
-        psi_a = psi[a]
-        diagonal = real(0.0)
+        a = first + wp.tid()
+        psi_a = vec()
         residual = K[a] @ defect[a] / reference.V[a]
-        for k in range(near.start[a], near.start[a + 1]):
-            b = near.index[k]
-            omega = reference.V[b] * near.g[k]
-            diagonal += omega
-            residual += (psi[b] - psi_a) * omega
-        if diagonal > real(0.0):
-            psi_a += residual * (real(relaxation) / diagonal)
+        if wp.static(not start):
+            psi_a = psi[a]
+            residual += sum_of(a, near, psi, reference.diagonal)
+        if reference.diagonal[a] > real(0.0):
+            psi_a += residual * (real(relaxation) / reference.diagonal[a])
         out[a] = psi_a
 
     return relax
@@ -141,6 +142,7 @@ def _make_shift(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(
+        first: int,
         particles: Particles,
         reference: Reference,
         psi: wp.array(dtype=vec),
@@ -148,7 +150,7 @@ def _make_shift(space: Space) -> Any:
         bound: real,
         lean: real,
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         spacing = particles.spacing[a]
         away = psi[a] * real(0.5)
         disorder = wp.dot(away, away) / (spacing * spacing)
@@ -163,24 +165,19 @@ def _make_shift(space: Space) -> Any:
 
 
 @functools.cache
-def _make_correct(space: Space) -> Any:
+def _make_correct(space: Space, simd: bool) -> Any:
     """Kernel: L_a = (Σ_b V_b g_ab ξ ⊗ ξ̂)⁻¹ with ξ̂ between balanced positions: M4 stays exact for linear fields (M13).
 
     Where the sum has lost half of det K, in neighbourhoods that are nearly flat, L_a stays that of M3.
     """
     real, mat = space.real, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    separation, invert, determinant = difference(space), inverse(space), det(space)
+    sum_of, invert, determinant = outer_sum(space, simd, of_positions=True), inverse(space), det(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correct_balanced(reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
-        a = wp.tid()
-        x_a, balanced_a = reference.x[a], reference.balanced[a]
-        sums = mat()
-        for k in range(near.start[a], near.start[a + 1]):
-            b = near.index[k]
-            xi = separation(reference.x[b], x_a, near.box)
-            sums += wp.outer(xi, separation(reference.balanced[b], balanced_a, near.box)) * (reference.V[b] * near.g[k])
+    def correct_balanced(first: int, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
+        a = first + wp.tid()
+        sums = sum_of(a, near, reference.x, reference.balanced)
         if determinant(sums) > real(0.5) * determinant(K[a]):
             reference.L[a] = invert(sums)
 
@@ -198,14 +195,13 @@ class BalancedPairs(UpwindForces):
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Balance the new reference."""
-        reference, near, n = configuration.fields, configuration.near, len(self.psi)
+        reference, near, n, simd = configuration.fields, configuration.near, len(self.psi), configuration.simd
         configuration.defect(state.surface, self.defect)
-        wp.launch(_make_renew(self.space), n, [reference, self.defect, state.surface], device=self.device)
-        self.psi.zero_()
-        for _ in range(self.option.sweeps):
+        self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface])
+        for sweep in range(self.option.sweeps):
             arguments = [reference, near, configuration.K, self.defect, self.psi, self._other]
-            wp.launch(_make_relax(self.space), n, arguments, device=self.device)
+            self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
             self.psi, self._other = self._other, self.psi
         arguments = [self.particles, reference, self.psi, self.stress, self.option.bound, self.option.lean]
-        wp.launch(_make_shift(self.space), n, arguments, device=self.device)
-        wp.launch(_make_correct(self.space), n, [reference, near, configuration.K], device=self.device)
+        self._launch(_make_shift(self.space), n, arguments)
+        self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])

@@ -6,8 +6,10 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
+from .pair_forces import PairForces
 from .reference import Configuration
 from .sensor import Sensor
 from .stabiliser import Stabiliser
@@ -76,6 +78,7 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate(
+        first: int,
         reference: Reference,
         near: Neighbours,
         flux: Flux,
@@ -85,7 +88,7 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
         sensor: wp.array(dtype=vec),
         out: wp.array(dtype=vec),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a = reference.x[a]
         V_a = reference.V[a]
         v_a = v[a]
@@ -95,7 +98,6 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
         force = vec()
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
-            V_b = reference.V[b]
             xi = separation(reference.x[b], x_a, near.box)
             plain = v[b] - v_a
             jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
@@ -103,9 +105,8 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
                 jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
             else:
                 jump = jump * epsilon
-            force += pair_force(
-                xi, V_a * V_b * near.g[k], Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b], jump
-            )
+            Z, Z_shear = Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b]
+            force += pair_force(xi, V_a * near.w[k], Z, Z_shear, jump)
         out[a] = force
 
     return dissipate
@@ -115,7 +116,8 @@ class UpwindForces(Stabiliser):
     """M9 alone, for references that need no correction."""
 
     def __init__(self, space: Space, device: Any):
-        self.space, self.device = space, device
+        self.space, self.device, self._launch = space, device, Launcher(device)
+        self._in_one_pass: PairForces | None = None
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Nothing to prepare: M9 needs the lists only."""
@@ -130,7 +132,13 @@ class UpwindForces(Stabiliser):
         sensor: wp.array | None,
         forces: Any,
     ) -> None:
-        """Dissipation (M9) into ``forces.dissipation``."""
+        """Internal force (M5) and dissipation (M9) into ``forces``."""
+        if configuration.simd and sensor is None:
+            if self._in_one_pass is None:
+                self._in_one_pass = PairForces(self.space, len(v), self.device)
+            self._in_one_pass.compute(configuration, flux, v, grad_v, epsilon, forces)
+            return
+        configuration.divergence(flux.Pi, forces.internal)
         arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
         arguments += [sensor if sensor is not None else v, forces.dissipation]
-        wp.launch(make_dissipation(self.space, sensor is not None), len(v), arguments, device=self.device)
+        self._launch(make_dissipation(self.space, sensor is not None), len(v), arguments)

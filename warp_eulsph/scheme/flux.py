@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from ..atomics import raise_to
+from ..execution import Launcher
 from ..fields import allocate, clock_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
 from ..materials import Law, Material
@@ -54,6 +56,7 @@ def _make_wave_speeds(space: Space, law: Law) -> Any:
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Clock, Constants = clock_structure(space), law.Constants
     invert, moduli, bounds = inverse(space), law.wave_moduli, symmetric_bounds(space)
+    raise_rate = raise_to(real)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
@@ -79,7 +82,7 @@ def _make_wave_speeds(space: Space, law: Law) -> Any:
         flux.shear_impedance[a] = rho_k * shear_speed
         spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
         lopsided = bounds((reference.L[a] + wp.transpose(reference.L[a])) * real(0.5))[1] / real(LOPSIDED)
-        wp.atomic_max(clock.rate, 0, speed * wp.sqrt(wp.max(lopsided, real(1.0))) / spacing)
+        raise_rate(clock.rate, speed * wp.sqrt(wp.max(lopsided, real(1.0))) / spacing)
 
     return wave_speeds
 
@@ -158,6 +161,7 @@ class Flux:
 
     def __init__(self, space: Space, bodies: list[tuple[Material, int]], particles: Any, device: Any):
         self.space, self.particles, self.device = space, particles, device
+        self._launch = Launcher(device)
         self.parts: list[_Part] = []
         first = 0
         for material, count in bodies:
@@ -175,21 +179,21 @@ class Flux:
     def compute(self, F: wp.array, reference: Any) -> None:
         """Q and Π = Q L of the deformation gradients ``F`` (M1, M5)."""
         for part in self.parts:
-            arguments = [part.first, F, reference, part.constants, self.fields]
-            wp.launch(_make_flux(self.space, part.law), part.size, arguments, device=self.device)
+            arguments = [F, reference, part.constants, self.fields]
+            self._launch(_make_flux(self.space, part.law), part.size, arguments, part.first)
 
     def wave_speeds(self, F: wp.array, reference: Any, clock: Any) -> None:
         """Wave speeds measured in the reference, and their largest rate [1/s] into ``clock.rate``."""
         clock.rate.zero_()
         for part in self.parts:
-            arguments = [part.first, F, self.particles, reference, part.constants, self.fields, clock]
-            wp.launch(_make_wave_speeds(self.space, part.law), part.size, arguments, device=self.device)
+            arguments = [F, self.particles, reference, part.constants, self.fields, clock]
+            self._launch(_make_wave_speeds(self.space, part.law), part.size, arguments, part.first)
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""
         for part in self.parts:
-            arguments = [part.first, F, self.particles, part.constants, out]
-            wp.launch(_make_energy(self.space, part.law), part.size, arguments, device=self.device)
+            arguments = [F, self.particles, part.constants, out]
+            self._launch(_make_energy(self.space, part.law), part.size, arguments, part.first)
 
     def carry(self, F: wp.array) -> None:
         """Reduce updated F to what each material carries, in place, and update the histories."""
@@ -197,8 +201,7 @@ class Flux:
             if part.law.carry is None:
                 continue
             if part.history is None:
-                kernel, arguments = _make_carry(self.space, part.law), [part.first, F, part.constants]
+                self._launch(_make_carry(self.space, part.law), part.size, [F, part.constants], part.first)
             else:
-                kernel = _make_carry_history(self.space, part.law)
                 arguments = [part.first, F, part.history, part.constants]
-            wp.launch(kernel, part.size, arguments, device=self.device)
+                self._launch.once(_make_carry_history(self.space, part.law), part.size, arguments)

@@ -5,6 +5,8 @@ from typing import Any
 
 import warp as wp
 
+from ..atomics import lower_to
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import det
 from ..space import Space
@@ -33,15 +35,15 @@ def _make_check(space: Space) -> Any:
     State, Clock, determinant = structure(space, "State"), clock_structure(space), det(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def check(state: State, clock: Clock):
-        a = wp.tid()
+    def check(first: int, state: State, clock: Clock):
+        a = first + wp.tid()
         finite = wp.isfinite(state.x[a]) and wp.isfinite(state.v[a]) and wp.isfinite(state.F[a])
         if not finite or determinant(state.F[a]) <= real(0.0):
-            wp.atomic_min(clock.bad, 0, a)
+            lower_to(clock.bad, a)
 
     return check
 
 
-def check(space: Space, state: Any, clock: Any, device: Any) -> None:
+def check(launch: Launcher, space: Space, state: Any, clock: Any) -> None:
     """Set ``clock.bad`` to the lowest index of a particle with det F ≤ 0 or a non-finite x, v or F."""
-    wp.launch(_make_check(space), len(state.x), [state, clock], device=device)
+    launch(_make_check(space), len(state.x), [state, clock])

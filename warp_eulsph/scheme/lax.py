@@ -104,7 +104,7 @@ class LaxStepper(LaxWendroffStepper):
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
         self.flux.carry(U.F)  # fluids keep J only
-        check(self.space, U, self.clock.fields, self.device)
+        check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, other, self.grad_v, self.forces, self.dv)
         self.clock.tick()
         self.steps += 1

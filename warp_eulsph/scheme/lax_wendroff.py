@@ -8,10 +8,9 @@ from typing import Any, ClassVar
 import warp as wp
 
 from ..boundaries import Bound
+from ..execution import Launcher
 from ..fields import allocate, clock_structure, structure
 from ..linalg import cofactor, inverse
-from ..operators.divergence import make_divergence
-from ..operators.gradient import make_gradient
 from ..space import Space
 from .balance import Balance
 from .dissipation import Upwind, UpwindForces
@@ -73,6 +72,7 @@ def _make_predict(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def predict(
+        first: int,
         particles: Particles,
         state: State,
         smoothed_F_k: wp.array(dtype=mat),
@@ -82,7 +82,7 @@ def _make_predict(space: Space) -> Any:
         fraction: wp.float64,
         half: State,
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         tau = real(fraction * clock.dt[0])
         force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
         half.v[a] = half.v[a] + force * (tau / particles.mass[a])
@@ -103,8 +103,8 @@ def _make_kick(space: Space) -> Any:
     Particles, Forces, Clock = structure(space, "Particles"), structure(space, "Forces"), clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def kick(particles: Particles, forces: Forces, clock: Clock, v: wp.array(dtype=vec)):
-        a = wp.tid()
+    def kick(first: int, particles: Particles, forces: Forces, clock: Clock, v: wp.array(dtype=vec)):
+        a = first + wp.tid()
         force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
         v[a] = v[a] + force * (real(clock.dt[0]) / particles.mass[a])
 
@@ -120,6 +120,7 @@ def _make_drift(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def drift(
+        first: int,
         reference: Reference,
         state: State,
         v: wp.array(dtype=vec),
@@ -128,7 +129,7 @@ def _make_drift(space: Space) -> Any:
         fraction: wp.float64,
         out: State,
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         tau = real(fraction * clock.dt[0])
         dF = grad_v[a] @ reference.F[a] * tau
         step = wp.identity(n=wp.static(space.dim), dtype=real) + dF @ invert(state.F[a])
@@ -163,6 +164,7 @@ class LaxWendroffStepper:
     ):
         n, device = len(U.x), flux.device
         self.options, self.space, self.device, self.n = options, space, device, n
+        self._launch = Launcher(device)
         self.U, self.half = U, allocate(space, "State", n, device)
         self.particles, self.flux, self.configuration = particles, flux, configuration
         self.policy, self.clock, self.conditions = policy, clock, conditions
@@ -218,7 +220,7 @@ class LaxWendroffStepper:
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
         self.flux.carry(U.F)  # fluids keep J only
-        check(self.space, U, self.clock.fields, self.device)
+        check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
         self.steps += 1
@@ -233,7 +235,7 @@ class LaxWendroffStepper:
         if self.shifter is not None:
             reference, psi = self.configuration.fields, self.stabiliser.psi
             self._velocity_gradient(U)
-            self._gradient(self._rows(U.F), self.grad_F)
+            self.configuration.gradient(self._rows(U.F), self.grad_F)
             self.shifter.apply(reference, psi, U, self.grad_v, self.grad_F, self.clock.fields)
             self._impose(U, 0.0)
             self.ledger.book_shift(U)
@@ -252,7 +254,7 @@ class LaxWendroffStepper:
     def _gradients(self, U: Any) -> None:
         self._velocity_gradient(U)
         if self.options.smoothing is not None and self.options.smoothing.needs_gradient:
-            self._gradient(self._rows(U.F), self.grad_F)
+            self.configuration.gradient(self._rows(U.F), self.grad_F)
 
     def _sense(self, U: Any) -> None:
         for sensor in self.sensors.values():
@@ -261,15 +263,13 @@ class LaxWendroffStepper:
             self.limiter.prepare(U, self.sensors[self.limiter.option.sensor].d)
 
     def _velocity_gradient(self, state: Any) -> None:
-        self._gradient(state.v, self.grad_v)
+        self.configuration.gradient(state.v, self.grad_v)
 
     def _stress(self, state: Any) -> None:
         self.flux.compute(state.F, self.configuration.fields)
 
     def _sum_forces(self, state: Any, v: wp.array, fraction: float) -> None:
         forces, configuration, options = self.forces, self.configuration, self.options
-        divergence = [configuration.fields, configuration.near, self.flux.fields.Pi, forces.internal]
-        wp.launch(make_divergence(self.space), self.n, divergence, device=self.device)
         epsilon, d = 0.0, None
         if options.dissipation is not None:
             epsilon = options.dissipation.epsilon
@@ -286,15 +286,15 @@ class LaxWendroffStepper:
 
     def _predict(self, U: Any, half: Any, fraction: float) -> None:
         arguments = [self.particles, U, self.smoothed_F_k, self.grad_v, self.forces, self.clock.fields, fraction, half]
-        wp.launch(_make_predict(self.space), self.n, arguments, device=self.device)
+        self._launch(_make_predict(self.space), self.n, arguments)
 
     def _kick(self, U: Any) -> None:
         arguments = [self.particles, self.forces, self.clock.fields, U.v]
-        wp.launch(_make_kick(self.space), self.n, arguments, device=self.device)
+        self._launch(_make_kick(self.space), self.n, arguments)
 
     def _drift(self, U: Any, v: wp.array, fraction: float, out: Any) -> None:
         arguments = [self.configuration.fields, U, v, self.grad_v, self.clock.fields, fraction, out]
-        wp.launch(_make_drift(self.space), self.n, arguments, device=self.device)
+        self._launch(_make_drift(self.space), self.n, arguments)
 
     def _limit(self, U: Any) -> None:
         if self.limiter is not None:
@@ -308,11 +308,6 @@ class LaxWendroffStepper:
     def _impose(self, state: Any, fraction: float) -> None:
         for condition in self.conditions:
             condition.impose(state, self.clock.fields, fraction)
-
-    def _gradient(self, rows: wp.array, out: wp.array) -> None:
-        kernel = make_gradient(self.space, wp.types.type_size(rows.dtype))
-        arguments = [self.configuration.fields, self.configuration.near, rows, out]
-        wp.launch(kernel, self.n, arguments, device=self.device)
 
     def _smooth_field(self, f: wp.array, gradient: wp.array, out: wp.array) -> None:
         if self.options.smoothing is None:

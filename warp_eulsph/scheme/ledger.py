@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..reduce import Sum
 from ..space import Space
@@ -39,6 +40,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def entries(
+        first: int,
         particles: Particles,
         reference: Reference,
         state: State,
@@ -54,7 +56,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
         forces: Forces,
         out: wp.array(dtype=_Entry),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         dt = clock.dt[0]
         mass = wide(particles.mass[a])
         v = precise(state.v[a])
@@ -178,6 +180,7 @@ class Ledger:
     ):
         n = len(particles.mass)
         self.space, self.particles, self.flux, self.device = space, particles, flux, device
+        self._launch = Launcher(device)
         self.configuration, self.clock, self.limiter = configuration, clock, limiter
         self._v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
@@ -217,7 +220,7 @@ class Ledger:
         arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
         arguments += [self.clock.fields, forces, self._entries]
         kernel = _make_entries(self.space, self.limiter is not None, smoothed is not None)
-        wp.launch(kernel, len(self._W), arguments, device=self.device)
+        self._launch(kernel, len(self._W), arguments)
         self._book()
 
     def book_shift(self, U: Any) -> None:
@@ -229,7 +232,7 @@ class Ledger:
 
     def _book(self) -> None:
         self._sum_entries(self._entries, self._step)
-        wp.launch(_make_book(), 1, [self._step, self._total], device=self.device)
+        self._launch.once(_make_book(), 1, [self._step, self._total])
 
     def kinetic(self, U: Any) -> float:
         """Kinetic energy [J]; reads the device."""

@@ -108,7 +108,7 @@ def _make_dissipate(space: Space, sensed: bool) -> Any:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
-            VVg = V_a * reference.V[b] * near.g[k]
+            VVg = V_a * near.w[k]
             plain = v[b] - v_a
             jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
             if wp.static(sensed):
@@ -148,7 +148,7 @@ def _make_correct(space: Space, limited: bool) -> Any:
         correction = vec()
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
-            f_ab = (Q_a + Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * V_a * reference.V[b] * near.g[k]))
+            f_ab = (Q_a + Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * V_a * near.w[k]))
             if wp.static(limited) and wp.dot(f_ab, v[b] - v_a) < real(0.0):
                 f_ab = f_ab * wp.min(admission[a], admission[b])
             correction += f_ab
@@ -187,8 +187,9 @@ class ClosedPairs(Stabiliser):
         sensor: wp.array | None,
         forces: Any,
     ) -> None:
-        """Dissipation (M9) and correction (M11, M12) into ``forces``."""
+        """Internal force (M5), dissipation (M9) and correction (M11, M12) into ``forces``."""
         if self.option.limited:
+            configuration.divergence(flux.Pi, forces.internal)
             arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
             arguments += [sensor if sensor is not None else v, self.solver.psi, self.option.kappa]
             arguments += [forces.dissipation, self.admission]

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher, simd
 from ..fields import allocate, neighbour_structure, structure
 from ..linalg import det, inverse, symmetric_bounds
-from ..operators.correction import make_correct, make_pair_sums
+from ..operators.correction import make_correct, make_pair_sums, make_pair_sums_simd
 from ..operators.divergence import make_divergence
+from ..operators.gradient import make_gradient
 from ..operators.interpolation import Interpolation
 from ..operators.neighbours import NeighbourLists
 from ..operators.values import Values
@@ -95,8 +97,8 @@ def _make_adopt(space: Space) -> Any:
     real, determinant, power = space.real, det(space), 1.0 / space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
-    def adopt(state: State, particles: Particles, reference: Reference):
-        a = wp.tid()
+    def adopt(first: int, state: State, particles: Particles, reference: Reference):
+        a = first + wp.tid()
         reference.x[a] = state.x[a]
         reference.F[a] = state.F[a]
         reference.balanced[a] = state.x[a]
@@ -148,8 +150,8 @@ def _make_defect(space: Space) -> Any:
     vec = space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
-    def defect(surface: wp.array(dtype=vec), out: wp.array(dtype=vec)):
-        a = wp.tid()
+    def defect(first: int, surface: wp.array(dtype=vec), out: wp.array(dtype=vec)):
+        a = first + wp.tid()
         out[a] = -out[a] - surface[a]
 
     return defect
@@ -162,11 +164,13 @@ class Configuration:
         fields: struct ``Reference`` of ``fields.py``.
         lists: neighbour lists, with the pair weights g_ab.
         poor: (n,) directions in which a particle's gradient fell back to zero; 0 is healthy.
+        simd: whether sums over neighbours run by SIMD kernels.
     """
 
     def __init__(self, space: Space, weight: Weight, particles: Any, box: Any, device: Any):
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
+        self.simd, self._launch = simd(device), Launcher(device)
         self.fields = allocate(space, "Reference", n, device)
         self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device)
         self.K = wp.zeros(n, dtype=space.mat, device=device)
@@ -182,11 +186,11 @@ class Configuration:
     def refresh(self, state: Any) -> None:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
         n = len(state.x)
-        wp.launch(_make_adopt(self.space), n, [state, self.particles, self.fields], device=self.device)
+        self._launch(_make_adopt(self.space), n, [state, self.particles, self.fields])
         self.lists.build(self.fields.x)
-        sums = [self.particles, self.fields, self.near, self.K]
-        wp.launch(make_pair_sums(self.weight, self.space), n, sums, device=self.device)
-        wp.launch(make_correct(self.space), n, [self.K, self.fields, self.poor], device=self.device)
+        pair_sums = (make_pair_sums_simd if self.simd else make_pair_sums)(self.weight, self.space)
+        self._launch(pair_sums, n, [self.particles, self.fields, self.near, self.K])
+        self._launch(make_correct(self.space), n, [self.K, self.fields, self.poor])
         for interpolation in self._interpolations.values():
             interpolation.refresh()
 
@@ -198,15 +202,23 @@ class Configuration:
             self._interpolations[values] = made
         return self._interpolations[values]
 
+    def gradient(self, f: wp.array, out: wp.array) -> None:
+        """``out`` ← ∇_k f, the corrected gradient (M4) of rows ``f`` of c reals, (n,) of c × dim reals."""
+        kernel = make_gradient(self.space, wp.types.type_size(f.dtype), self.simd)
+        self._launch(kernel, len(f), [self.fields, self.near, f, out])
+
+    def divergence(self, Pi: wp.array, out: wp.array) -> None:
+        """``out`` ← −T, the dual divergence (M5) of Π = Q Lᵀ, (n,) of vec."""
+        self._launch(make_divergence(self.space, self.simd), len(out), [self.fields, self.near, Pi, out])
+
     def defect(self, surface: wp.array, out: wp.array) -> None:
         """``out`` ← e_a − s_a [m^(d−1)], (n,) of vec, for surface vectors s_a (M10).
 
         e_a = Σ_b V_b G_a(x_b), the dual divergence (M5) of a unit stress: what a uniform stress would exert on a. To be
         asked for before positions are balanced (M13), as long as L is symmetric.
         """
-        arguments = [self.fields, self.near, self.fields.L, out]
-        wp.launch(make_divergence(self.space), len(out), arguments, device=self.device)
-        wp.launch(_make_defect(self.space), len(out), [surface, out], device=self.device)
+        self.divergence(self.fields.L, out)
+        self._launch(_make_defect(self.space), len(out), [surface, out])
 
     def nearest(self) -> np.ndarray:
         """Distance of each particle to its nearest neighbour [m], (n,), inf without one; reads the device."""

@@ -12,7 +12,6 @@ import warp as wp
 
 from ..boundaries.base import Assembly, Region
 from ..fields import allocate, structure
-from ..operators.gradient import make_gradient
 from ..space import Space
 from ..weights import CubicSpline, Weight
 from .reference import Configuration
@@ -233,13 +232,13 @@ class ConservationLaw:
             wp.copy(out, self.U)
             return
         if smoothing.needs_gradient:
-            self._gradient(self.U, self._grad_U)
+            self.configuration.gradient(self.U, self._grad_U)
         smoothing.apply(self.space, self.configuration, self.U, self._grad_U, out)
 
     def differentiate(self, U: wp.array) -> None:
         """∇f(U) (M4), whose trace ``advance`` takes."""
         wp.launch(_make_flux(self.space, self.function), self.n, [U, self._flux], device=self.device)
-        self._gradient(self._flux, self._grad_flux)
+        self.configuration.gradient(self._flux, self._grad_flux)
 
     def advance(self, base: wp.array, dt: float, out: wp.array) -> None:
         """``out`` ← base − Δt ∇·f of the last ``differentiate``."""
@@ -250,8 +249,3 @@ class ConservationLaw:
         if len(self._held):
             arguments = [self._held, self._held_values, U]
             wp.launch(_make_hold(self.space), len(self._held), arguments, device=self.device)
-
-    def _gradient(self, f: wp.array, out: wp.array) -> None:
-        kernel = make_gradient(self.space, wp.types.type_size(f.dtype))
-        arguments = [self.configuration.fields, self.configuration.near, f, out]
-        wp.launch(kernel, self.n, arguments, device=self.device)

@@ -26,4 +26,4 @@ class Stabiliser(ABC):
         sensor: wp.array | None,
         forces: Any,
     ) -> None:
-        """Dissipation (M9, share ``epsilon``, switched by ``sensor``) and correction [N] into ``forces``."""
+        """Internal force (M5), dissipation (M9, ε, switched by ``sensor``) and correction [N] into ``forces``."""

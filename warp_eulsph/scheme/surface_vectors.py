@@ -66,7 +66,7 @@ class SurfaceForces(Stabiliser):
         sensor: wp.array | None,
         forces: Any,
     ) -> None:
-        """Dissipation (M9) and correction (M10) into ``forces``."""
+        """Internal force (M5), dissipation (M9) and correction (M10) into ``forces``."""
         self.upwind.compute(configuration, flux, v, grad_v, epsilon, sensor, forces)
         arguments = [flux.Q, self.defect, forces.correction]
         wp.launch(_make_correction(self.space), len(v), arguments, device=self.device)

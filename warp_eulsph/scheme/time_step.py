@@ -7,6 +7,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
 from .health import WELL
@@ -84,6 +85,7 @@ class DeviceClock:
 
     def __init__(self, space: Space, option: TimeStep, cfl: float, device: Any):
         self.space, self.option, self.device = space, option, device
+        self._launch = Launcher(device)
         self.cfl = cfl if option.cfl is None else option.cfl
         self.fields = clock_structure(space)()
         for name in ("t", "dt", "free_dt", "target"):
@@ -114,7 +116,7 @@ class DeviceClock:
         """Δt for the step to come, from ``rate``."""
         option = self.option
         arguments = [self.fields, self.cfl, option.growth, option.fixed or 0.0]
-        wp.launch(_make_choose(self.space), 1, arguments, device=self.device)
+        self._launch.once(_make_choose(self.space), 1, arguments)
 
     @property
     def bad(self) -> int | None:
@@ -124,4 +126,4 @@ class DeviceClock:
 
     def tick(self) -> None:
         """t ← t + Δt, exactly the target when it is reached."""
-        wp.launch(_make_tick(self.space), 1, [self.fields], device=self.device)
+        self._launch.once(_make_tick(self.space), 1, [self.fields])

@@ -53,8 +53,8 @@ def _make_mean(space: Space) -> Any:
     real, vec = space.real, space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
-    def mean(v_new: wp.array(dtype=vec), v: wp.array(dtype=vec)):
-        a = wp.tid()
+    def mean(first: int, v_new: wp.array(dtype=vec), v: wp.array(dtype=vec)):
+        a = first + wp.tid()
         v[a] = (v[a] + v_new[a]) * real(0.5)
 
     return mean
@@ -84,7 +84,7 @@ class VerletStepper(LaxWendroffStepper):
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
         self.flux.carry(U.F)  # fluids keep J only
-        check(self.space, U, self.clock.fields, self.device)
+        check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
         self.steps += 1
@@ -93,4 +93,4 @@ class VerletStepper(LaxWendroffStepper):
         wp.copy(half.v, U.v)
 
     def _finish_mean(self, U: Any, half: Any) -> None:
-        wp.launch(_make_mean(self.space), self.n, [U.v, half.v], device=self.device)
+        self._launch(_make_mean(self.space), self.n, [U.v, half.v])

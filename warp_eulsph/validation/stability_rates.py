@@ -10,14 +10,11 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..fields import allocate
-from ..operators.divergence import make_divergence
-from ..operators.gradient import make_gradient
 from ..scheme.dissipation import UpwindForces
 from ..simulation import Simulation
 from .stability_step import Point, Step
@@ -79,8 +76,7 @@ def _gradient(simulation: Simulation, v: wp.array) -> wp.array:
     """∇v (M4), (n,) of mat."""
     space, configuration = simulation.space, simulation.stepper.configuration
     grad_v = wp.zeros(len(v), dtype=space.mat, device=simulation.device)
-    arguments: list[Any] = [configuration.fields, configuration.near, v, grad_v]
-    wp.launch(make_gradient(space, space.dim), len(v), arguments, device=simulation.device)
+    configuration.gradient(v, grad_v)
     return grad_v
 
 
@@ -94,8 +90,7 @@ def _accelerate(simulation: Simulation, v: wp.array) -> np.ndarray:
             simulation.F + sign * DIFFERENCE * grad_v @ simulation.F, dtype=simulation.space.mat, device=v.device
         )
         stepper.flux.compute(F, configuration.fields)
-        arguments: list[Any] = [configuration.fields, configuration.near, stepper.flux.fields.Pi, out]
-        wp.launch(make_divergence(simulation.space), len(v), arguments, device=simulation.device)
+        configuration.divergence(stepper.flux.fields.Pi, out)
         force += sign / (2.0 * DIFFERENCE) * out.numpy()
     return force
 

@@ -17,6 +17,8 @@ class Weight(ABC):
 
     support: ClassVar[float]
     sigma: ClassVar[tuple[float, float, float]]
+    #: −w'(q)/q once more, in C++ for SIMD kernels: an expression of the vector q, of type V with components of type T.
+    slope_cpp: ClassVar[str]
 
     @abstractmethod
     def profile(self, real: type) -> tuple[Any, Any]:
@@ -61,12 +63,13 @@ def pair_weight(weight: Weight, space: Space) -> Any:
 
     @wp.func
     def pair_weight(r: real, h: real) -> real:
-        q = r / h
+        rate = real(1.0) / h
+        q = r * rate
         g = real(0.0)
         if q < real(support):
             g = real(sigma) * slope(q)
             for _ in range(wp.static(dim + 2)):
-                g = g / h
+                g = g * rate
         return g
 
     return pair_weight

@@ -14,6 +14,7 @@ class CubicSpline(Weight):
 
     support = 2.0
     sigma = (2.0 / 3.0, 10.0 / (7.0 * math.pi), 1.0 / math.pi)
+    slope_cpp = "q < 1 ? 3 - T(2.25) * q : T(0.75) * (2 - q) * (2 - q) / q"
 
     def profile(self, real: type) -> tuple[Any, Any]:
         return _profile(real)

@@ -14,6 +14,10 @@ class QuarticSpline(Weight):
 
     support = 2.5
     sigma = (1.0 / 24.0, 96.0 / (1199.0 * math.pi), 1.0 / (20.0 * math.pi))
+    slope_cpp = (
+        "q < T(0.5) ? 30 - 24 * q * q : [](V a, V b) { return 4 * (a * a * a - 5 * b * b * b); }"
+        "(T(2.5) - q, __builtin_elementwise_max(T(1.5) - q, (V)0)) / q"
+    )
 
     def profile(self, real: type) -> tuple[Any, Any]:
         return _profile(real)

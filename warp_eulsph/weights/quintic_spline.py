@@ -14,6 +14,10 @@ class QuinticSpline(Weight):
 
     support = 3.0
     sigma = (1.0 / 120.0, 7.0 / (478.0 * math.pi), 1.0 / (120.0 * math.pi))
+    slope_cpp = (
+        "q < 1 ? 120 - 120 * q * q + 50 * q * q * q : [](V a, V b) { return 5 * (a * a - 6 * b * b * b * b); }"
+        "((3 - q) * (3 - q), __builtin_elementwise_max(2 - q, (V)0)) / q"
+    )
 
     def profile(self, real: type) -> tuple[Any, Any]:
         return _profile(real)

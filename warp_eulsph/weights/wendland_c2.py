@@ -14,6 +14,7 @@ class WendlandC2(Weight):
 
     support = 2.0
     sigma = (3.0 / 4.0, 7.0 / (4.0 * math.pi), 21.0 / (16.0 * math.pi))
+    slope_cpp = "[](V u) { return 5 * u * u * u; }(1 - T(0.5) * q)"
 
     def profile(self, real: type) -> tuple[Any, Any]:
         return _profile(real)

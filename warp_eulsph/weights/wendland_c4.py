@@ -14,6 +14,7 @@ class WendlandC4(Weight):
 
     support = 2.0
     sigma = (27.0 / 32.0, 9.0 / (4.0 * math.pi), 495.0 / (256.0 * math.pi))
+    slope_cpp = "[](V u) { return T(14.0 / 3) * u * u * u * u * u; }(1 - T(0.5) * q) * (1 + T(2.5) * q)"
 
     def profile(self, real: type) -> tuple[Any, Any]:
         return _profile(real)

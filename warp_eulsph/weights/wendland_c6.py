@@ -14,6 +14,7 @@ class WendlandC6(Weight):
 
     support = 2.0
     sigma = (15.0 / 16.0, 39.0 / (14.0 * math.pi), 1365.0 / (512.0 * math.pi))
+    slope_cpp = "[](V u) { V c = u * u * u; return T(5.5) * c * c * u; }(1 - T(0.5) * q) * (1 + q * (T(3.5) + 4 * q))"
 
     def profile(self, real: type) -> tuple[Any, Any]:
         return _profile(real)

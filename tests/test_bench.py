@@ -1,0 +1,101 @@
+"""``warp-eulsph bench``: what programs read of it, and that its measures measure."""
+
+import dataclasses
+import json
+
+import pytest
+import warp as wp
+
+from warp_eulsph import execution
+from warp_eulsph.bench import command
+from warp_eulsph.bench.cases import CASES, MODES
+from warp_eulsph.bench.machine import arithmetic, bandwidth
+from warp_eulsph.bench.memory import array_bytes
+from warp_eulsph.bench.phases import PHASES
+from warp_eulsph.cli import main
+
+KEYS = {
+    "case",
+    "dim",
+    "dtype",
+    "mode",
+    "particles",
+    "neighbours",
+    "threads",
+    "particle_steps_per_second",
+    "roof_fraction",
+    "bytes_per_particle",
+}
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """A small case in every mode, timed for a moment, on a machine of given limits."""
+    small = [case for case in CASES if case.name.endswith("2d-float64")]
+    assert {case.mode for case in small} == set(MODES)
+    monkeypatch.setattr(command, "CASES", tuple(dataclasses.replace(case, side=20) for case in small))
+    monkeypatch.setattr(command, "SECONDS_PER_ROUND", 0.01)
+    monkeypatch.setattr(command, "limits_of", lambda dtype, threads: (20e9, 50e9))
+
+
+def test_names_of_cases_differ_and_cover_modes_dimensions_and_precisions():
+    assert len({case.name for case in CASES}) == len(CASES)
+    assert {(case.dim, case.dtype, case.mode) for case in CASES} == {
+        (dim, dtype, mode) for dim in (1, 2, 3) for dtype in ("float32", "float64") for mode in MODES
+    }
+
+
+def test_json_has_the_keys_and_plausible_values(quick, capsys):
+    threads = execution.threads()
+    assert main(["bench", "-k", "2d-float64", "--json"]) == 0
+    results = json.loads(capsys.readouterr().out)
+    assert [result["mode"] for result in results] == list(MODES)
+    for result in results:
+        assert set(result) >= KEYS
+        assert result["particles"] == 400
+        assert 15.0 < result["neighbours"] < 21.0
+        assert 1e3 < result["particle_steps_per_second"] <= 2e7
+        assert 0.0 < result["roof_fraction"] < 1.0
+        assert 400.0 < result["bytes_per_particle"] < 4000.0
+        assert set(result["phases"]) <= {*PHASES, "other"}
+        assert sum(result["phases"].values()) > 0.0
+    total, _, eulerian = results
+    assert eulerian["phases"]["neighbour search"] > 0.0
+    assert "neighbour search" not in total["phases"]
+    assert eulerian["particle_steps_per_cpu_second"] < total["particle_steps_per_cpu_second"]
+    assert execution.threads() == threads
+
+
+def test_lines_for_people_name_case_rate_and_phases(quick, capsys):
+    assert main(["bench", "-k", "total"]) == 0
+    shown = capsys.readouterr().out
+    assert "total-2d-float64: " in shown and "M particle-steps/s" in shown and "forces (M5, M9)" in shown
+
+
+def test_unknown_case_is_named(capsys):
+    assert main(["bench", "-k", "no such"]) == 2
+    assert "no case is named like 'no such'; there are: total-1d-float32" in capsys.readouterr().err
+
+
+def test_memory_counts_shared_arrays_once():
+    class Holder:
+        pass
+
+    Holder.__module__ = "warp_eulsph.somewhere"
+    array = wp.zeros(100, dtype=wp.vec3d, device="cpu")
+    holder = Holder()
+    holder.fields, holder.again, holder.part = {"a": array}, [array], array[10:20]
+    holder.other = wp.zeros(7, dtype=wp.float32, device="cpu")
+    assert array_bytes(holder) == 2400 + 28
+
+
+@pytest.mark.parametrize("real", [wp.float32, wp.float64])
+def test_limits_of_the_machine_are_of_this_world(real):
+    """Between a tenth of a slow core and a large server."""
+    threads = execution.threads()
+    execution.set_threads(1)
+    try:
+        assert 1e9 < bandwidth(real) < 2e12
+        assert 1e9 < arithmetic(real) < 1e12
+    finally:
+        execution.set_threads(threads)

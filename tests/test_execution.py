@@ -1,0 +1,190 @@
+"""How kernels run changes nothing: threads keep every bit, SIMD kernels equal the portable ones up to round-off."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import warp as wp
+from clouds import cloud, configuration_of
+
+import warp_eulsph as es
+from warp_eulsph import execution
+
+DTYPES = [wp.float32, wp.float64]
+SIDE = {1: 40, 2: 12, 3: 7}
+WEIGHTS = [subclass() for subclass in es.Weight.__subclasses__()]
+
+
+@pytest.fixture(autouse=True)
+def restored():
+    """Leave the settings as they were."""
+    threads, simd = execution.threads(), execution.simd("cpu")
+    yield
+    execution.set_threads(threads)
+    execution.set_simd(simd)
+
+
+def disordered(dim, dtype, reference, **options):
+    """A jittered block of rubber in irregular motion, of two bodies that overlap."""
+    x, volume = cloud(dim, SIDE[dim], jitter=0.15)
+    rng = np.random.default_rng(2)
+    material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
+    bodies = [
+        es.Body(x=x + shift, volume=volume, material=material, velocity=8.0 * rng.normal(size=x.shape), name=name)
+        for name, shift in (("one", 0.0), ("two", 0.3))
+    ]
+    return es.Simulation(bodies, reference=reference, dtype=dtype, time_step=es.TimeStep(fixed=2e-6), **options)
+
+
+def results(simulation, steps):
+    simulation.step(steps)
+    stepper = simulation.stepper
+    fields = {"x": simulation.x, "v": simulation.v, "F": simulation.F, "surface": stepper.U.surface.numpy().copy()}
+    for name in ("internal", "dissipation"):
+        fields[name] = getattr(stepper.forces, name).numpy().copy()
+    return fields | {"rate": np.array(simulation.clock.fields.rate.numpy()), "energy": [*simulation.energy().values()]}
+
+
+def assert_equal_to_round_off(portable, vector, dtype):
+    """Impedances have the root of the spread of the stretches, which near F = 1 turns round-off ε into √ε.
+
+    A step moves v by a hundredth of itself or less.
+    """
+    eps = np.finfo(np.float32 if dtype is wp.float32 else float).eps
+    bounds = {"x": 4 * eps, "F": 1e3 * eps, "internal": 1e4 * eps}
+    bounds |= {"dissipation": np.sqrt(eps), "v": 1e-2 * np.sqrt(eps)}
+    for name, bound in bounds.items():
+        assert np.abs(vector[name] - portable[name]).max() <= bound * np.abs(portable[name]).max(), name
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
+@pytest.mark.parametrize("simd", [True, False])
+def test_threads_keep_every_bit(dim, reference, dtype, simd, monkeypatch):
+    monkeypatch.setattr(execution, "LEAST_RANGE", 16)
+    execution.set_simd(simd)
+    found = {}
+    for threads in (1, 2, 3):
+        execution.set_threads(threads)
+        assert (len(execution._ranges(80)) > 1) is (threads > 1)
+        found[threads] = results(disordered(dim, dtype, reference), 8)
+    for threads in (2, 3):
+        for name, values in found[1].items():
+            assert np.array_equal(values, found[threads][name]), name
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
+def test_simd_equals_portable(dim, reference, dtype):
+    """Ten steps: differences of round-off in forces and corrections, which the steps do not amplify."""
+    found = {}
+    for simd in (False, True):
+        execution.set_simd(simd)
+        simulation = disordered(dim, dtype, reference)
+        assert simulation.stepper.configuration.simd is simd
+        found[simd] = results(simulation, 10)
+    assert_equal_to_round_off(found[False], found[True], dtype)
+    assert not np.array_equal(found[True]["internal"], found[False]["internal"])  # it is another kernel
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("weight", WEIGHTS, ids=repr)
+def test_simd_pair_sums_equal_portable(weight, dim, dtype):
+    """Lists, pair weights, K and its companions, for every weight and different smoothing lengths."""
+    x, volume = cloud(dim, SIDE[dim], jitter=0.3)
+    h = 1.4 / SIDE[dim] * np.random.default_rng(3).uniform(0.8, 1.3, len(x))
+    found = {}
+    for simd in (False, True):
+        execution.set_simd(simd)
+        configuration = configuration_of(x, volume, h, weight=weight, real=dtype)
+        near, fields, pairs = configuration.near, configuration.fields, configuration.lists.pairs
+        arrays = [near.start, near.index[:pairs], near.w[:pairs], configuration.K, fields.row, fields.diagonal]
+        found[simd] = [array.numpy().copy() for array in arrays]
+    for k, (portable, vector) in enumerate(zip(found[False], found[True], strict=True)):
+        if k < 2:
+            assert np.array_equal(portable, vector)
+        else:
+            tolerance = 200 * np.finfo(portable.dtype).eps
+            assert np.abs(vector - portable).max() <= tolerance * np.abs(portable).max()
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_simd_equals_portable_in_a_periodic_box(dim, dtype):
+    x, volume = cloud(dim, SIDE[dim], jitter=0.15)
+    velocity = 5.0 * np.random.default_rng(4).normal(size=x.shape)
+    found = {}
+    for simd in (False, True):
+        execution.set_simd(simd)
+        material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
+        body = es.Body(x=x, volume=volume, material=material, velocity=velocity, surface=0.0)
+        simulation = es.Simulation(body, periodic=(1.0,) * dim, dtype=dtype, time_step=es.TimeStep(fixed=2e-6))
+        found[simd] = results(simulation, 10)
+    assert_equal_to_round_off(found[False], found[True], dtype)
+
+
+def test_long_rows_and_far_away_particles_are_found():
+    """A row of more than 512 neighbours, and a cloud with a particle so far away that cells must be widened."""
+    rng = np.random.default_rng(5)
+    x = np.concatenate([rng.uniform(0.0, 1.0, (900, 2)), [[1e7, -1e7]]])
+    found = {}
+    for simd in (False, True):
+        execution.set_simd(simd)
+        configuration = configuration_of(x, np.full(len(x), 1e-3), 0.45)
+        pairs = configuration.lists.pairs
+        found[simd] = configuration.near.start.numpy().copy(), configuration.near.index.numpy()[:pairs].copy()
+    assert np.diff(found[True][0]).max() > 600
+    assert all(np.array_equal(*both) for both in zip(found[False], found[True], strict=True))
+
+
+def test_rows_of_far_apart_indices_are_sorted():
+    """Indices that differ by more than 16 bits hold are ranked in full."""
+    n = 70_000
+    x = np.random.default_rng(6).permutation((np.arange(n) + 0.5) / n)[:, None]
+    found = {}
+    for simd in (False, True):
+        execution.set_simd(simd)
+        configuration = configuration_of(x, np.full(n, 1.0 / n), 1.3 / n)
+        found[simd] = configuration.near.index.numpy()[: configuration.lists.pairs].copy()
+    rows = found[True].reshape(-1, 1)
+    assert np.ptp(rows) > 65536
+    assert np.array_equal(found[False], found[True])
+
+
+def test_steps_record_their_launches_once():
+    """A launch that is recorded anew in every step costs as much as none recorded, and piles up."""
+    simulation = disordered(2, wp.float64, es.Always())
+    stepper = simulation.stepper
+    lists = stepper.configuration.lists
+    owners = [stepper, stepper.flux, stepper.ledger, stepper.clock, stepper.configuration, stepper.stabiliser]
+    owners += [lists, lists.cells, stepper.stabiliser._in_one_pass or stepper]
+    recorded = []
+    for _ in range(4):
+        simulation.step(4)
+        recorded.append([len(owner._launch._recorded) for owner in owners])
+    assert recorded[1:] == recorded[:1] * 3
+    assert sum(recorded[0]) > 20
+
+
+def test_bad_settings_are_named():
+    with pytest.raises(ValueError, match="threads must be at least 1, got 0"):
+        execution.set_threads(0)
+    for name, value in (("WARP_EULSPH_THREADS", "many"), ("WARP_EULSPH_SIMD", "yes")):
+        command = [sys.executable, "-c", "import warp_eulsph"]
+        run = subprocess.run(command, env={**os.environ, name: value}, capture_output=True, text=True)
+        assert run.returncode != 0
+        assert f"{name} must be" in run.stderr
+
+
+def test_defaults_are_all_cores_and_simd():
+    execution.set_threads(None)
+    assert execution.threads() == len(os.sched_getaffinity(0))
+    run = [sys.executable, "-c", "from warp_eulsph import execution as e; print(e.threads(), e.simd('cpu'))"]
+    environment = {**os.environ, "WARP_EULSPH_THREADS": "3", "WARP_EULSPH_SIMD": "0"}
+    shown = subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout
+    assert shown.split()[-2:] == ["3", "False"]

@@ -1,0 +1,67 @@
+"""The benchmark cases: a jittered block of rubber, spinning and waving, in every mode, dimension and precision."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ..geometry import box
+from ..materials import Material, NeoHookean
+from ..scheme.reference import Always, Every, Never, ReferencePolicy
+from ..simulation import Body, Simulation
+
+MODES: dict[str, ReferencePolicy] = {"total": Never(), "every_k": Every(10), "eulerian": Always()}
+DTYPES = {"float32": wp.float32, "float64": wp.float64}
+
+
+@dataclass(frozen=True)
+class BenchCase:
+    """One problem to time.
+
+    Args:
+        name: as ``-k`` selects it.
+        dim: dimension.
+        dtype: "float32" or "float64".
+        mode: "total", "every_k" (refreshed every tenth step) or "eulerian".
+        side: particles along each axis.
+        threads: threads on the CPU.
+        material: law of the block.
+    """
+
+    name: str
+    dim: int
+    dtype: str
+    mode: str
+    side: int
+    threads: int = 1
+    material: Material = NeoHookean(density=1100.0, young=17e6, poisson=0.45)
+
+    def build(self) -> Simulation:
+        """The block: lattice with a jitter of a tenth of the spacing, 74 neighbours in 3-D, far from rest."""
+        x, volume = box((0.0,) * self.dim, (1.0,) * self.dim, 1.0 / self.side)
+        x = x + np.random.default_rng(0).uniform(-0.1, 0.1, x.shape) / self.side
+        velocity = np.zeros_like(x)
+        velocity[:, -1] = 10.0 * np.sin(3.0 * x[:, 0])
+        if self.dim > 1:
+            velocity[:, 0] -= 10.0 * x[:, 1]
+            velocity[:, 1] += 10.0 * x[:, 0]
+        body = Body(x=x, volume=volume, spacing=1.0 / self.side, material=self.material, velocity=velocity)
+        return Simulation(body, reference=MODES[self.mode], dtype=DTYPES[self.dtype])
+
+
+def _all() -> Iterator[BenchCase]:
+    for mode in MODES:
+        for dtype in DTYPES:
+            for dim, side in ((1, 20_000), (2, 224), (3, 37)):
+                yield BenchCase(f"{mode}-{dim}d-{dtype}", dim, dtype, mode, side)
+    for mode in ("total", "eulerian"):
+        for dtype in DTYPES:
+            yield BenchCase(f"{mode}-3d-{dtype}-2-threads", 3, dtype, mode, 37, threads=2)
+        for size, side in (("10k", 22), ("100k", 46), ("400k", 74), ("1M", 100)):
+            yield BenchCase(f"{mode}-3d-float64-{size}", 3, "float64", mode, side)
+    yield BenchCase("small-1d-float64", 1, "float64", "total", 40)
+    yield BenchCase("small-1d-float64-eulerian", 1, "float64", "eulerian", 40)
+
+
+CASES = tuple(_all())

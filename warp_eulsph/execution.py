@@ -1,0 +1,142 @@
+"""How kernels run on the CPU: on how many threads, and whether by SIMD kernels or by the portable ones.
+
+Neither changes what is computed. Threads keep every bit: each particle gathers its own sums, so that it does not matter
+who computes it. SIMD kernels differ from the portable ones by round-off.
+
+The environment sets the defaults: ``WARP_EULSPH_THREADS`` (all cores the process may use) and ``WARP_EULSPH_SIMD``
+(1; 0 turns it off).
+"""
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any
+
+import warp as wp
+
+# Below this many particles a pointwise kernel takes less time than handing it to a thread (some 20 µs).
+LEAST_RANGE = 2048
+# More ranges than threads, so that a core that is busy elsewhere takes fewer of them.
+RANGES_PER_THREAD = 4
+# Launches that an object repeats are a few dozen; arguments that are made anew each time must not pile up.
+MOST_RECORDED = 256
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _from_environment() -> tuple[int, bool]:
+    given = os.environ.get("WARP_EULSPH_THREADS", "")
+    if given and not (given.isdigit() and int(given) > 0):
+        raise ValueError(f"WARP_EULSPH_THREADS must be a number of threads, at least 1, got {given!r}")
+    vectors = os.environ.get("WARP_EULSPH_SIMD", "1")
+    if vectors not in ("0", "1"):
+        raise ValueError(f"WARP_EULSPH_SIMD must be 0 or 1, got {vectors!r}")
+    return int(given) if given else _cores(), vectors == "1"
+
+
+_threads, _simd = _from_environment()
+_pool: ThreadPoolExecutor | None = None
+
+
+def threads() -> int:
+    """Threads that share the particles of a launch on the CPU."""
+    return _threads
+
+
+def set_threads(count: int | None = None) -> None:
+    """Use ``count`` threads on the CPU from now on; all cores that the process may use by default."""
+    global _threads, _pool
+    if count is not None and count < 1:
+        raise ValueError(f"threads must be at least 1, got {count}; None takes all cores")
+    if _pool is not None:
+        _pool.shutdown()
+    _threads, _pool = _cores() if count is None else count, None
+
+
+def set_simd(on: bool) -> None:
+    """Whether simulations made from now on use SIMD kernels where they run on the CPU."""
+    global _simd
+    _simd = on
+
+
+def simd(device: Any) -> bool:
+    """Whether SIMD kernels are to be used on this device."""
+    return _simd and wp.get_device(device).is_cpu
+
+
+class Launcher:
+    """Launches of one object on one device, recorded: a repeated one costs a fifth of ``wp.launch``.
+
+    Two launches are the same if kernel, extent and arguments are: numbers equal, arrays and structs the same objects.
+    What fields of a struct point to may change in between.
+    """
+
+    def __init__(self, device: Any):
+        self.device = wp.get_device(device)
+        self._recorded: dict[tuple[Any, ...], tuple[list[Any], Any]] = {}
+
+    def __call__(self, kernel: Any, n: int, arguments: Sequence[Any], first: int = 0) -> None:
+        """Launch over particles ``first`` … ``first + n − 1``, in ranges on several threads on the CPU.
+
+        The kernel's first parameter, which is not among ``arguments``, is the index that its thread 0 has. It must
+        write to its own particle only.
+        """
+        ranges = _ranges(n) if self.device.is_cpu else ((0, n),)
+        commands = self._commands(kernel, ranges, arguments, first)
+        if len(ranges) == 1:
+            commands[0].launch()
+            return
+        # A launch on the CPU releases the interpreter's lock while it runs; whoever is free takes the next range.
+        rest = iter(commands)
+        waiting = [_workers().submit(_take, rest) for _ in range(_threads - 1)]
+        _take(rest)
+        for worker in waiting:
+            worker.result()
+
+    def once(self, kernel: Any, dim: int, arguments: Sequence[Any]) -> None:
+        """Launch a kernel of ``dim`` threads that has no such parameter, in one piece."""
+        self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
+
+    def forget(self) -> None:
+        """Let go of the recorded launches and of the arrays they hold."""
+        self._recorded.clear()
+
+    def _commands(
+        self, kernel: Any, ranges: tuple[tuple[int, int], ...], arguments: Sequence[Any], first: int | None
+    ) -> list[Any]:
+        key = (kernel, ranges, first, *[a if isinstance(a, (int, float)) else id(a) for a in arguments])
+        known = self._recorded.get(key)
+        if known is None:
+            if len(self._recorded) >= MOST_RECORDED:
+                self.forget()
+            lead = [[] if first is None else [first + begin] for begin, _ in ranges]
+            commands = [
+                wp.launch(kernel, end - begin, [*own, *arguments], device=self.device, record_cmd=True)
+                for own, (begin, end) in zip(lead, ranges, strict=True)
+            ]
+            known = self._recorded[key] = commands, arguments  # keeps the arguments, and so their ids, alive
+        return known[0]
+
+
+def _take(commands: Iterator[Any]) -> None:
+    for command in commands:
+        command.launch()
+
+
+def _ranges(n: int) -> tuple[tuple[int, int], ...]:
+    """[begin, end) of the ranges that n particles are split into."""
+    count = 1 if _threads == 1 else min(_threads * RANGES_PER_THREAD, n // LEAST_RANGE)
+    if count <= 1:
+        return ((0, n),)
+    ends = [n * k // count for k in range(count + 1)]
+    return tuple(pairwise(ends))
+
+
+def _workers() -> ThreadPoolExecutor:
+    global _pool
+    if _pool is None:
+        _pool = ThreadPoolExecutor(_threads - 1, thread_name_prefix="warp-eulsph")
+    return _pool

@@ -1,0 +1,170 @@
+"""Sums over one particle's row of neighbours, which the operators are made of: portable, or SIMD on the CPU.
+
+Each factory returns a ``wp.func`` of (a, near, …); with ``simd`` it is the SIMD one, equal up to round-off.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..fields import neighbour_structure
+from ..simd import prelude
+from ..space import Space, difference
+
+
+@functools.cache
+def laplacian_sum(space: Space, simd: bool) -> Any:
+    """``wp.func`` (a, near, f, diagonal) -> Σ_b w_ab (f_b − f_a), ``diagonal`` = Σ_b w_ab."""
+    real, vec = space.real, space.vec
+    Neighbours = neighbour_structure(space)
+    if not simd:
+
+        @wp.func
+        def laplacian_sum(a: int, near: Neighbours, f: wp.array(dtype=vec), diagonal: wp.array(dtype=real)):
+            f_a = f[a]
+            total = vec()
+            for k in range(near.start[a], near.start[a + 1]):
+                total += (f[near.index[k]] - f_a) * near.w[k]
+            return total
+
+        return laplacian_sum
+
+    snippet = f"""
+    {prelude(Space(space.dim, space.real))}
+    V even = 0, odd = 0;
+    int k = begin;
+    for (; k + 1 < end; k += 2) {{
+        even += load(f.data[index.data[k]].c) * w.data[k];
+        odd += load(f.data[index.data[k + 1]].c) * w.data[k + 1];
+    }}
+    if (k < end) even += load(f.data[index.data[k]].c) * w.data[k];
+    return store(even + odd);
+    """
+
+    @wp.func_native(snippet)
+    def weighted_sum(
+        begin: int, end: int, index: wp.array(dtype=int), w: wp.array(dtype=real), f: wp.array(dtype=vec)
+    ) -> vec: ...
+
+    @wp.func
+    def laplacian_sum_simd(a: int, near: Neighbours, f: wp.array(dtype=vec), diagonal: wp.array(dtype=real)):
+        return weighted_sum(near.start[a], near.start[a + 1], near.index, near.w, f) - f[a] * diagonal[a]
+
+    return laplacian_sum_simd
+
+
+@functools.cache
+def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
+    """``wp.func`` (a, near, f, x) -> Σ_b w_ab (f_b − f_a) ⊗ (x_b − x_a) of two fields of ``vec``, x positions.
+
+    With ``of_positions`` f are positions too, whose differences take the nearest image in a periodic box.
+    """
+    real, vec, mat = space.real, space.vec, space.mat
+    Neighbours = neighbour_structure(space)
+    separation = difference(space)
+    if not simd:
+
+        @wp.func
+        def outer_sum(a: int, near: Neighbours, f: wp.array(dtype=vec), x: wp.array(dtype=vec)):
+            f_a, x_a = f[a], x[a]
+            sums = mat()
+            for k in range(near.start[a], near.start[a + 1]):
+                b = near.index[k]
+                df = f[b] - f_a
+                if wp.static(of_positions):
+                    df = separation(f[b], f_a, near.box)
+                sums += wp.outer(df, separation(x[b], x_a, near.box) * near.w[k])
+            return sums
+
+        return outer_sum
+
+    snippet = f"""
+    {prelude(space)}
+    const V f_a = load(f.data[a].c), x_a = load(x.data[a].c);
+    V sums[dim];
+    #pragma unroll
+    for (int i = 0; i < dim; ++i) sums[i] = 0;
+    for (int k = begin; k < end; ++k) {{
+        const int b = index.data[k];
+        const V df = {"nearest" if of_positions else ""}(load(f.data[b].c) - f_a);
+        const V dx = nearest(load(x.data[b].c) - x_a) * w.data[k];
+        #pragma unroll
+        for (int i = 0; i < dim; ++i) sums[i] += df[i] * dx;
+    }}
+    wp::mat_t<dim, dim, T> out;
+    #pragma unroll
+    for (int i = 0; i < dim; ++i) for (int j = 0; j < dim; ++j) out.data[i][j] = sums[i][j];
+    return out;
+    """
+
+    @wp.func_native(snippet)
+    def outer_row(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        box: vec,
+        f: wp.array(dtype=vec),
+        x: wp.array(dtype=vec),
+    ) -> mat: ...
+
+    @wp.func
+    def outer_sum_simd(a: int, near: Neighbours, f: wp.array(dtype=vec), x: wp.array(dtype=vec)):
+        return outer_row(a, near.start[a], near.start[a + 1], near.index, near.w, near.box, f, x)
+
+    return outer_sum_simd
+
+
+@functools.cache
+def flux_sum(space: Space, simd: bool) -> Any:
+    """``wp.func`` (a, near, Q, x) -> Σ_b w_ab (Q_a + Q_b)(x_b − x_a) for a field of ``mat``."""
+    real, vec, mat = space.real, space.vec, space.mat
+    Neighbours = neighbour_structure(space)
+    separation = difference(space)
+    if not simd:
+
+        @wp.func
+        def flux_sum(a: int, near: Neighbours, Q: wp.array(dtype=mat), x: wp.array(dtype=vec)):
+            Q_a, x_a = Q[a], x[a]
+            total = vec()
+            for k in range(near.start[a], near.start[a + 1]):
+                b = near.index[k]
+                total += (Q_a + Q[b]) @ (separation(x[b], x_a, near.box) * near.w[k])
+            return total
+
+        return flux_sum
+
+    snippet = f"""
+    {prelude(space)}
+    const V x_a = load(x.data[a].c);
+    V Q_a[dim], sums[4] = {{0, 0, 0, 0}};
+    #pragma unroll
+    for (int i = 0; i < dim; ++i) Q_a[i] = load(Q.data[a].data[i]);
+    for (int k = begin; k < end; ++k) {{
+        const int b = index.data[k];
+        const V dx = nearest(load(x.data[b].c) - x_a) * w.data[k];
+        #pragma unroll
+        for (int i = 0; i < dim; ++i) sums[i] += (Q_a[i] + load(Q.data[b].data[i])) * dx;
+    }}
+    return store(lane_sums(sums));
+    """
+
+    @wp.func_native(snippet)
+    def flux_row(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        box: vec,
+        Q: wp.array(dtype=mat),
+        x: wp.array(dtype=vec),
+    ) -> vec: ...
+
+    @wp.func
+    def flux_sum_simd(a: int, near: Neighbours, Q: wp.array(dtype=mat), x: wp.array(dtype=vec)):
+        return flux_row(a, near.start[a], near.start[a + 1], near.index, near.w, near.box, Q, x)
+
+    return flux_sum_simd

@@ -1,0 +1,155 @@
+"""Internal force (M5) and dissipation (M9) in one SIMD pass over the neighbours, on the CPU."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..execution import Launcher
+from ..fields import neighbour_structure, structure
+from ..simd import BY_FOUR, packed_rows, prelude
+from ..space import Space
+from .reference import Configuration
+
+
+def _vectors(space: Space) -> int:
+    """Vectors in a packed row: x with the impedance, v with the shear impedance, columns of ∇v, columns of Π with x̂."""
+    return 2 + 2 * space.dim
+
+
+@functools.cache
+def _make_pack(space: Space) -> Any:
+    """Kernel: what the pass reads of a neighbour, side by side."""
+    real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
+    first_grad, first_Pi = 8, 8 + 4 * dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pack(
+        first: int,
+        reference: Reference,
+        flux: Flux,
+        v: wp.array(dtype=vec),
+        grad_v: wp.array(dtype=mat),
+        rows: wp.array2d(dtype=real),
+    ):
+        a = first + wp.tid()
+        x_a, v_a, grad_a, Pi_a, balanced_a = reference.x[a], v[a], grad_v[a], flux.Pi[a], reference.balanced[a]
+        rows[a, 3] = flux.impedance[a]
+        rows[a, 7] = flux.shear_impedance[a]
+        for i in range(wp.static(dim)):
+            rows[a, i] = x_a[i]
+            rows[a, 4 + i] = v_a[i]
+            rows[a, first_Pi + 4 * i + 3] = balanced_a[i]
+            for j in range(wp.static(dim)):
+                rows[a, first_grad + 4 * j + i] = grad_a[i, j]
+                rows[a, first_Pi + 4 * j + i] = Pi_a[i, j]
+
+    return pack
+
+
+@functools.cache
+def _make_forces(space: Space) -> Any:
+    """Kernel: M5 and M9 from packed rows."""
+    real, vec = space.real, space.vec
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+    # the difference of one coordinate of balanced positions, nearest image in a periodic box
+    balanced = "P[3]"
+    if space.periodic:
+        balanced = "P[3] - image_box[j] * __builtin_rint(P[3] * image_rate[j])"
+    snippet = f"""
+    {prelude(space)}
+    constexpr int vectors = {_vectors(space)};
+    const V* const all = (const V*)rows.data;
+    const V* const A = all + (size_t)a * vectors;
+    const V x_a = A[0], v_a = A[1];
+    V grad_a[dim], Pi_a[dim], internal = 0, dissipation = 0;
+    #pragma unroll
+    for (int j = 0; j < dim; ++j) {{
+        grad_a[j] = A[2 + j];
+        Pi_a[j] = A[2 + dim + j];
+        Pi_a[j][3] = -Pi_a[j][3];
+    }}
+    auto four = [&](const int* b, V w) __attribute__((always_inline)) {{
+        V xi[4], jump[4], squares[4], along[4], Z, Z_shear;
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) {{
+            const V* const B = all + (size_t)b[i] * vectors;
+            xi[i] = nearest(B[0] - x_a);
+            Z[i] = B[0][3];
+            Z_shear[i] = B[1][3];
+            V mean = (grad_a[0] + B[2]) * xi[i][0];
+            #pragma unroll
+            for (int j = 1; j < dim; ++j) mean += (grad_a[j] + B[2 + j]) * xi[i][j];
+            jump[i] = B[1] - v_a - T(0.5) * mean;
+            squares[i] = xi[i] * xi[i];
+            along[i] = xi[i] * jump[i];
+            V force = 0;
+            #pragma unroll
+            for (int j = 0; j < dim; ++j) {{
+                const V P = Pi_a[j] + B[2 + dim + j];
+                force += P * ({balanced});
+            }}
+            internal += force * w[i];
+        }}
+        V rr = lane_sums(squares);
+        rr = rr > 0 ? rr : (V)1;
+        Z += x_a[3];
+        Z_shear += v_a[3];
+        const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon);
+        const V normal = lane_sums(along) * (Z - Z_shear) / rr * area, shear = Z_shear * area;
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) dissipation += xi[i] * normal[i] + jump[i] * shear[i];
+    }};
+    {BY_FOUR}
+    internals.data[a] = store(internal * V_a);
+    dissipations.data[a] = store(dissipation * V_a);
+    """
+
+    @wp.func_native(snippet)
+    def sum_forces(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        box: vec,
+        rows: wp.array2d(dtype=real),
+        epsilon: real,
+        V_a: real,
+        internals: wp.array(dtype=vec),
+        dissipations: wp.array(dtype=vec),
+    ): ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pair_forces(
+        first: int,
+        reference: Reference,
+        near: Neighbours,
+        rows: wp.array2d(dtype=real),
+        epsilon: real,
+        internal: wp.array(dtype=vec),
+        dissipation: wp.array(dtype=vec),
+    ):
+        a = first + wp.tid()
+        begin, end = near.start[a], near.start[a + 1]
+        sum_forces(a, begin, end, near.index, near.w, near.box, rows, epsilon, reference.V[a], internal, dissipation)
+
+    return pair_forces
+
+
+class PairForces:
+    """The pass at work on n particles."""
+
+    def __init__(self, space: Space, n: int, device: Any):
+        self.space, self._launch = space, Launcher(device)
+        self._rows = packed_rows(space, n, _vectors(space), device)
+
+    def compute(
+        self, configuration: Configuration, flux: Any, v: wp.array, grad_v: wp.array, epsilon: float, forces: Any
+    ) -> None:
+        """``forces.internal`` (M5) and ``forces.dissipation`` (M9 without a sensor) [N]."""
+        n = len(v)
+        self._launch(_make_pack(self.space), n, [configuration.fields, flux, v, grad_v, self._rows])
+        arguments = [configuration.fields, configuration.near, self._rows, epsilon]
+        self._launch(_make_forces(self.space), n, [*arguments, forces.internal, forces.dissipation])
