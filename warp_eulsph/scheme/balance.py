@@ -12,6 +12,7 @@ from ..linalg import det, inverse
 from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
 from .dissipation import UpwindForces
+from .flux import Flux
 from .reference import Configuration
 
 # Share of the residual that a sweep corrects, by dimension. The saw-tooth, the wave that pairs particles up, has the
@@ -19,26 +20,36 @@ from .reference import Configuration
 # it down fastest without overshooting; what is corrected too far repels in tension, pairs in compression.
 RELAXATION = {1: 0.52, 2: 0.75, 3: 0.85}
 
+# Disorder |½ψ|, over the spacing, at which half of the lean is taken: little of it in lattices, nearly all of it where
+# particles have begun to rearrange. At first order in the disorder there is none.
+LEANING = 0.02
+
 # A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
 OPENED = 1.0
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Pair vectors of M4 and M5 from x̂ = x − ½ψ; ψ relaxes towards Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
+    """Pair vectors of M4 and M5 from x̂ = x − ½(1 + λT)ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
 
     M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
     it, whatever ψ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
     which are the ones that pair particles up. Where e_a − s_a exceeds the particle's own face, the body has opened
     or closed: s_a becomes e_a, a free surface or none.
 
+    What is closed exactly does not return either: particles that something has moved, stay. So along directions of
+    tension, T of the stress, a disordered arrangement is corrected too far, by up to the share λ = ``lean``: there it
+    pushes back.
+
     Args:
         sweeps: relaxation sweeps per refresh, from ψ = 0.
         bound: largest |x̂ − x| over the particle's spacing.
+        lean: largest λ; 0 closes alike in all directions.
     """
 
     sweeps: int = 5
     bound: float = 0.25
+    lean: float = 1.0
 
     def __post_init__(self) -> None:
         if self.sweeps < 1:
@@ -46,9 +57,12 @@ class Balance:
         if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
             raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.25 is the tested value")
 
-    def build(self, space: Space, particles: Any, bodies: list[range], device: Any) -> "BalancedPairs":
+        if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 2.0):
+            raise ValueError(f"lean must be in [0, 2], got {self.lean}; 1 is the tested value")
+
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "BalancedPairs":
         """Allocate."""
-        return BalancedPairs(self, space, particles, device)
+        return BalancedPairs(self, space, particles, flux, device)
 
 
 @functools.cache
@@ -104,16 +118,45 @@ def _make_relax(space: Space, simd: bool, start: bool) -> Any:
 
 
 @functools.cache
+def tension(space: Space) -> Any:
+    """``wp.func`` T = ½(Q̂ + Q̂²), Q̂ = Q/|Q|: near 1 along directions of tension, near 0 along those of compression."""
+    real, mat = space.real, space.mat
+
+    @wp.func
+    def tension(Q: mat) -> mat:
+        T = mat()
+        size = wp.sqrt(wp.ddot(Q, Q))
+        if size > real(0.0):
+            T = Q / size
+            T = (T + T @ T) * real(0.5)
+        return T
+
+    return tension
+
+
+@functools.cache
 def _make_shift(space: Space) -> Any:
-    """Kernel: x̂ = x − ½ψ, not further than ``bound`` spacings (M13)."""
-    real, vec = space.real, space.vec
-    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+    """Kernel: x̂ = x − ½(1 + λT)ψ, λ = lean m²/(m² + LEANING²), m = |½ψ| and |x̂ − x| ≤ ``bound``, both in spacings."""
+    real, vec, mat = space.real, space.vec, space.mat
+    Particles, Reference, T_of = structure(space, "Particles"), structure(space, "Reference"), tension(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def shift(first: int, particles: Particles, reference: Reference, psi: wp.array(dtype=vec), bound: real):
+    def shift(
+        first: int,
+        particles: Particles,
+        reference: Reference,
+        psi: wp.array(dtype=vec),
+        Q: wp.array(dtype=mat),
+        bound: real,
+        lean: real,
+    ):
         a = first + wp.tid()
+        spacing = particles.spacing[a]
         away = psi[a] * real(0.5)
-        most = bound * particles.spacing[a]
+        disorder = wp.dot(away, away) / (spacing * spacing)
+        share = lean * disorder / (disorder + real(LEANING * LEANING))
+        away += T_of(Q[a]) @ away * share
+        most = bound * spacing
         if wp.length(away) > most:
             away = away * (most / wp.length(away))
         reference.balanced[a] = reference.x[a] - away
@@ -144,8 +187,9 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    def __init__(self, option: Balance, space: Space, particles: Any, device: Any):
+    def __init__(self, option: Balance, space: Space, particles: Any, flux: Flux, device: Any):
         super().__init__(space, device)
+        self.stress = flux.fields.Q  # of the last step when a refresh asks for it
         self.option, self.particles, n = option, particles, len(particles.mass)
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
 
@@ -162,5 +206,6 @@ class BalancedPairs(UpwindForces):
             arguments = [reference, near, configuration.K, self.defect, self.psi, self._other]
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
             self.psi, self._other = self._other, self.psi
-        self._launch(_make_shift(self.space), n, [self.particles, reference, self.psi, self.option.bound])
+        arguments = [self.particles, reference, self.psi, self.stress, self.option.bound, self.option.lean]
+        self._launch(_make_shift(self.space), n, arguments)
         self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])

@@ -12,6 +12,7 @@ from ..operators.laplacian import LaplacianSolver
 from ..reduce import Sum
 from ..space import Space, difference
 from .dissipation import UpwindForces, blend, upwind
+from .flux import Flux
 from .reference import Configuration
 from .stabiliser import Stabiliser
 
@@ -40,9 +41,9 @@ class PairAreas:
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(self, space: Space, particles: Any, bodies: list[range], device: Any) -> "ClosedPairs":
-        """Allocate for ``bodies``, each a range of particles."""
-        return ClosedPairs(self, space, particles, bodies, device)
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "ClosedPairs":
+        """Allocate for the bodies of ``flux``, each a range of particles."""
+        return ClosedPairs(self, space, particles, flux.bodies, device)
 
 
 @functools.cache

@@ -8,6 +8,7 @@ import warp as wp
 
 from ..space import Space
 from .dissipation import UpwindForces
+from .flux import Flux
 from .projection import Projection
 from .reference import Configuration
 from .stabiliser import Stabiliser
@@ -24,9 +25,9 @@ class SurfaceVectors:
 
     project: bool = False
 
-    def build(self, space: Space, particles: Any, bodies: list[range], device: Any) -> "SurfaceForces":
-        """Allocate for ``bodies``, each a range of particles."""
-        return SurfaceForces(self, space, particles, bodies, device)
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "SurfaceForces":
+        """Allocate for the bodies of ``flux``, each a range of particles."""
+        return SurfaceForces(self, space, particles, flux.bodies, device)
 
 
 @functools.cache

@@ -22,6 +22,7 @@ import warp as wp
 
 from .. import (
     Always,
+    Balance,
     Every,
     Never,
     PairAreas,
@@ -52,7 +53,7 @@ REFERENCES: dict[str, tuple[ReferencePolicy, dict[str, Any]]] = {
     "every 2": (Every(2), {}),
     "criterion": (WhenDistorted(1.2), {}),
     "always": (Always(), {}),
-    "always, shifted": (Always(), {"scheme": Verlet(shifting=Shifting())}),
+    "always, shifted": (Always(), {"scheme": Verlet(correction=Balance(lean=0.0), shifting=Shifting())}),
     "always, M11": (Always(), {"scheme": Verlet(correction=PairAreas(kappa=math.inf))}),
     "always, M10": (Always(), {"scheme": Verlet(correction=SurfaceVectors())}),
 }

@@ -179,9 +179,10 @@ def _strained(quick: bool) -> Iterator[Study]:
                         yield Study(
                             "strained", name, replace(point, scheme=scheme), "power iteration, growth rate dx/c"
                         )
-        for cfl in (0.2, 0.4):
-            point = Point(dim=dim, across=PERIODIC[dim], strain=0.1, reference=Always(), cfl=cfl)
-            yield Study("step of the strained", "default", point, "growth rate dx/c")
+    for gamma in (1.0, 2.0, 5.0):  # a square lattice sheared by a whole number is one again
+        point = Point(dim=2, across=PERIODIC[2], strain=((0.0, gamma), (0.0, 0.0)), reference=Always())
+        for name in ("M5 alone", "default", "M13, 30 sweeps", "M11"):
+            yield Study("sheared", name, replace(point, scheme=CORRECTIONS[name][0]), "growth rate dx/c")
 
 
 def scan(wanted: Iterable[Study]) -> list[Result]:

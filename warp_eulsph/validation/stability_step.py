@@ -40,8 +40,9 @@ class Point:
         across: particles along each axis.
         periodic: whether the body fills a periodic box; otherwise it is a cube with free faces.
         jitter: largest random displacement of a particle along each axis, in [0, 0.5).
-        strain: uniform strain of the state along each axis, one number or ``dim``; only periodic bodies hold it. The
-            lattice is that of the reference, so Eulerian it is the strained one that has spacing 1.
+        strain: uniform F − I of the state: one number or ``dim`` along the axes, or ``dim`` rows of ``dim``; only
+            periodic bodies hold it. The lattice is that of the reference, so Eulerian it is the strained one that has
+            spacing 1.
         reference: Never() for total Lagrangian, Always() for Eulerian.
         scheme: options of the scheme.
         weight: SPH weight.
@@ -57,7 +58,7 @@ class Point:
     across: int = 8
     periodic: bool = True
     jitter: float = 0.0
-    strain: float | tuple[float, ...] = 0.0
+    strain: float | tuple[float, ...] | tuple[tuple[float, ...], ...] = 0.0
     reference: ReferencePolicy = Never()
     scheme: Verlet | LaxWendroff = Verlet()
     weight: Weight = CubicSpline()
@@ -155,11 +156,12 @@ class Step:
         """Bring the body to the strain of the point, keeping the lattice of the reference, and read the time step."""
         simulation, point = self.simulation, self.point
         stepper, flux, configuration = simulation.stepper, simulation.stepper.flux, simulation.stepper.configuration
-        stretch = 1.0 + np.broadcast_to(np.asarray(point.strain, dtype=float), (point.dim,))
-        stepper.U.F.assign(np.broadcast_to(np.diag(stretch), (len(simulation.x), point.dim, point.dim)))
+        strain = np.asarray(point.strain, dtype=float)
+        F = np.eye(point.dim) + (strain if strain.ndim == 2 else np.diag(np.broadcast_to(strain, (point.dim,))))
+        stepper.U.F.assign(np.broadcast_to(F, (len(simulation.x), point.dim, point.dim)))
         if self.moving:
             # The lattice of unit cells is the strained one: its particles were smaller before, h and spacing with them.
-            particles, volume = simulation.particles, stretch.prod()
+            particles, volume = simulation.particles, np.linalg.det(F)
             for field in (particles.V0, particles.mass):
                 field.assign(field.numpy() / volume)
             for field in (particles.h, particles.spacing):
