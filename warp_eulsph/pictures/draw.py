@@ -1,5 +1,7 @@
 """Frames of a run to picture and film files."""
 
+import contextlib
+import itertools
 import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
@@ -148,9 +150,11 @@ def _save_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
     command += ["-r", f"{fps:g}", "-i", "-", "-pix_fmt", "yuv420p", str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None and encoder.stderr is not None
-        for image in (first, *stream):
-            encoder.stdin.write(np.ascontiguousarray(image[:height, :width]).tobytes())
-        encoder.stdin.close()
+        with contextlib.suppress(BrokenPipeError):  # when it gives up, it says why
+            for image in itertools.chain([first], stream):
+                encoder.stdin.write(np.ascontiguousarray(image[:height, :width]).tobytes())
+            encoder.stdin.close()
         complaint = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode:
+        path.unlink(missing_ok=True)
         raise OSError(f"{path}: ffmpeg failed: {complaint}")
