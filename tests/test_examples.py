@@ -4,9 +4,10 @@ import importlib
 import json
 from pathlib import Path
 
+import h5py
 import pytest
 
-from warp_eulsph.output import Figure, read_snapshot, table
+from warp_eulsph.output import Figure, Run, read_snapshot, table
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -23,6 +24,9 @@ def run(monkeypatch, tmp_path):
         listing = json.loads((tmp_path / name / "run.vtkhdf.series").read_text())["files"]
         last = read_snapshot(tmp_path / name / listing[-1]["name"])
         assert last.time == listing[-1]["time"] > 0.0
+        assert len(Run(tmp_path / name)) == len(listing)
+        with h5py.File(tmp_path / name / "run.vtkhdf") as index:
+            assert index["VTKHDF/Steps"].attrs["NSteps"] == len(listing)
         return figures, len(listing)
 
     return run

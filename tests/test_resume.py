@@ -8,6 +8,7 @@ import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.boundaries import Bound
+from warp_eulsph.commands.loading import examples, load_case
 from warp_eulsph.output.checkpoint import decode, encode, take
 from warp_eulsph.output.description import describe, differences
 
@@ -205,3 +206,9 @@ def test_description_tells_simulations_apart():
     assert not differences(describe(blocks(2)), describe(blocks(2)))
     changes = differences(describe(blocks(2)), describe(blocks(2, es.Never(), es.LaxWendroff())))
     assert "reference.type: Always, now Never" in changes and "scheme.type: Verlet, now LaxWendroff" in changes
+
+
+@pytest.mark.parametrize("name", examples())
+def test_resume_is_bitwise_for_every_example(name):
+    coarse = load_case(f"example:{name}", ["parameters.n=6"])
+    resume_is_exact(coarse.build, before=4, after=4)

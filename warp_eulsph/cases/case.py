@@ -83,7 +83,7 @@ class OutputTable(Table):
     at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
     fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
     precision: Precision = Field("single", description="of the stored numbers")
-    log: choice(Schedule) = Field({"kind": "EverySteps", "count": 10}, validate_default=True)  # type: ignore[valid-type]
+    log: choice(Schedule) = Field({"kind": "EverySteps", "count": 16}, validate_default=True)  # type: ignore[valid-type]
     checkpoint: Number = Field(600.0, gt=0.0, description="wall time between checkpoints [s]")
 
     @field_validator("fields")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..output import SnapshotWriter
 from ..simulation import Simulation
 
 #: Columns by name, each of shape (number of times,); ``t`` [s] is the time.
@@ -17,7 +18,7 @@ def record(
     times: np.ndarray,
     observe: Callable[[], dict[str, float]],
     *,
-    writer: Any = None,
+    writer: SnapshotWriter | None = None,
     stride: int = 10,
 ) -> History:
     """What ``observe`` gives at increasing ``times``, which are hit exactly.
@@ -26,7 +27,7 @@ def record(
         simulation: what is run.
         times: when to look [s], (k,), from the present time on.
         observe: figures of the present state, the same names every time.
-        writer: object with ``write(simulation)``, asked every ``stride`` looks; None writes nothing.
+        writer: writes a snapshot every ``stride`` looks; None writes nothing.
         stride: looks between two snapshots.
     """
     rows = []
@@ -34,6 +35,8 @@ def record(
         rows.append({"t": t, **observe()})
         if writer is not None and k % stride == 0:
             writer.write(simulation)
+    if writer is not None:
+        writer.finish()
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 

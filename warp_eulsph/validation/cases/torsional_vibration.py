@@ -1,11 +1,11 @@
 """Small torsional vibration of a square column: how soft coarse columns are, and why.
 
 A column 1 m × 6 m × 1 m, base clamped, swings about its axis at ω = π/(2 H) √(G J/(ρ I_p)) by Saint-Venant's theory,
-with J = 0.140577 and I_p = 1/6 for the unit square. Coarse columns swing too slowly. Two thirds of that and more show in the
-energy of a twist that is given, u = sin(π y/2H)(z, 0, −x): M4 differentiates linear fields exactly, but at a lateral
-face, where all neighbours lie on one side, it reads the strain of this field a fraction of a spacing further in, where
-there is less of it. The rest is that cross-sections warp too readily: central differences do not see warping from
-particle to particle.
+with J = 0.140577 and I_p = 1/6 for the unit square. Coarse columns swing too slowly. Two thirds of that and more show
+in the energy of a twist that is given, u = sin(π y/2H)(z, 0, −x): M4 differentiates linear fields exactly, but at a
+lateral face, where all neighbours lie on one side, it reads the strain of this field a fraction of a spacing further
+in, where there is less of it. The rest is that cross-sections warp too readily: central differences do not see
+warping from particle to particle.
 """
 
 import math
