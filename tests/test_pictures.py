@@ -120,6 +120,11 @@ def test_film_shows_every_snapshot(run, tmp_path):
     assert all((a != b).any() for a, b in itertools.pairwise(frames))
 
 
+def test_film_of_nothing_is_refused(run, tmp_path):
+    with pytest.raises(ValueError, match="at least one frame"):
+        film(run, tmp_path / "a.gif", frames=[])
+
+
 def test_film_as_mp4_needs_ffmpeg(run, tmp_path, monkeypatch):
     import imageio_ffmpeg
 
