@@ -2,7 +2,6 @@
 
 import csv
 import itertools
-import shutil
 import sys
 from pathlib import Path
 from typing import ClassVar
@@ -121,13 +120,30 @@ def test_film_shows_every_snapshot(run, tmp_path):
     assert all((a != b).any() for a, b in itertools.pairwise(frames))
 
 
+def test_film_of_nothing_is_refused(run, tmp_path):
+    with pytest.raises(ValueError, match="at least one frame"):
+        film(run, tmp_path / "a.gif", frames=[])
+
+
 def test_film_as_mp4_needs_ffmpeg(run, tmp_path, monkeypatch):
-    if shutil.which("ffmpeg"):
-        path = film(run, tmp_path / "a.mp4", Picture(size=(301, 201)))
-        assert path.read_bytes()[4:8] == b"ftyp"
-    monkeypatch.setattr(shutil, "which", lambda name: None)
+    import imageio_ffmpeg
+
+    (tmp_path / "bin").mkdir()
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
     with pytest.raises(FileNotFoundError, match="needs the program ffmpeg"):
-        film(run, tmp_path / "b.mp4")
+        film(run, tmp_path / "a.mp4")
+    program = tmp_path / "bin" / "ffmpeg"
+    program.symlink_to(imageio_ffmpeg.get_ffmpeg_exe())
+    path = film(run, tmp_path / "a.mp4", Picture(size=(301, 201)), fps=2.0)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert frames == 4 and seconds == pytest.approx(2.0, abs=0.1)
+    assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (300, 200)  # the encoder takes even sides only
+    program.unlink()
+    program.write_text("#!/bin/sh\necho no room >&2\nexit 1\n")
+    program.chmod(0o755)
+    with pytest.raises(OSError, match="ffmpeg failed: no room"):
+        film(run, tmp_path / "b.mp4", Picture(size=(300, 200)))
+    assert not (tmp_path / "b.mp4").exists()
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Frames of a run to picture and film files."""
 
+import contextlib
+import itertools
 import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
@@ -106,7 +108,11 @@ def draw_frame(frame: RunFrame, options: Picture) -> np.ndarray:
 
 
 def fitted(options: Picture, frames: Iterable[RunFrame]) -> Picture:
-    """The options with what they leave open, limits and view, taken from the frames: what fits all of them."""
+    """The options with what they leave open taken from the frames: limits and extent that fit all of them.
+
+    Raises:
+        ValueError: no such field, or no frames.
+    """
     edge, low, high, least, largest = options.spacing, None, None, np.inf, -np.inf
     for frame in frames:
         values = quantity(frame, options.field).values
@@ -116,7 +122,8 @@ def fitted(options: Picture, frames: Iterable[RunFrame]) -> Picture:
             edge = spacing(x)
         low = x.min(axis=0) if low is None else np.minimum(low, x.min(axis=0))
         high = x.max(axis=0) if high is None else np.maximum(high, x.max(axis=0))
-    assert edge is not None and low is not None and high is not None
+    if edge is None or low is None or high is None:
+        raise ValueError("there must be at least one frame to draw, got none")
     margin = edge + 0.02 * float((high - low).max())
     extent = np.stack([low - margin, high + margin]) if options.extent is None else options.extent
     limits = options.limits
@@ -148,9 +155,11 @@ def _save_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
     command += ["-r", f"{fps:g}", "-i", "-", "-pix_fmt", "yuv420p", str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None and encoder.stderr is not None
-        for image in (first, *stream):
-            encoder.stdin.write(np.ascontiguousarray(image[:height, :width]).tobytes())
-        encoder.stdin.close()
+        with contextlib.suppress(BrokenPipeError):  # when it gives up, it says why
+            for image in itertools.chain([first], stream):
+                encoder.stdin.write(np.ascontiguousarray(image[:height, :width]).tobytes())
+            encoder.stdin.close()
         complaint = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode:
+        path.unlink(missing_ok=True)
         raise OSError(f"{path}: ffmpeg failed: {complaint}")
