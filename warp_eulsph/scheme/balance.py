@@ -194,8 +194,8 @@ class BalancedPairs(UpwindForces):
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
 
     def evolving(self) -> dict[str, wp.array]:
-        """The potentials, which shifting (M15) follows before the next refresh makes new ones."""
-        return {"BalancedPairs.psi": self.psi}
+        """The stress that the next refresh leans on, and the potentials that shifting (M15) follows before it."""
+        return {"BalancedPairs.psi": self.psi, "BalancedPairs.stress": self.stress}
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Balance the new reference."""
