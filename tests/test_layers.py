@@ -16,7 +16,7 @@ LAYERS = [
     {"fields", "weights", "materials", "boundaries", "reduce"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "schedule", "diagnostics", "output", "geometry"},
+    {"simulation", "schedule", "diagnostics", "memory", "output", "geometry"},
     {"validation", "bench"},
     {"cases", "cli", "__main__"},
 ]
