@@ -10,9 +10,9 @@ from warp_eulsph import execution
 from warp_eulsph.bench import command
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
-from warp_eulsph.bench.memory import array_bytes
 from warp_eulsph.bench.phases import PHASES
 from warp_eulsph.cli import main
+from warp_eulsph.memory import array_bytes
 
 KEYS = {
     "case",

@@ -16,7 +16,7 @@ LAYERS = [
     {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "diagnostics", "output", "geometry"},
+    {"simulation", "diagnostics", "memory", "output", "geometry"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

@@ -91,7 +91,7 @@ class Launcher:
             return
         # A launch on the CPU releases the interpreter's lock while it runs; whoever is free takes the next range.
         rest = iter(commands)
-        waiting = [_workers().submit(_take, rest) for _ in range(_threads - 1)]
+        waiting = [_workers().submit(_take, rest) for _ in range(min(_threads, len(ranges)) - 1)]
         _take(rest)
         for worker in waiting:
             worker.result()

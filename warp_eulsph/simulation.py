@@ -10,6 +10,7 @@ from .body import Body
 from .boundaries import Assembly, Boundary
 from .diagnostics import Diagnostics
 from .fields import allocate
+from .memory import check_memory
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.flux import Flux, check_reference
 from .scheme.health import UnstableError
@@ -45,6 +46,7 @@ class Simulation:
     Raises:
         ValueError: bodies of different dimension, equal names, coincident particles, particles whose neighbours do not
             span the space, a region that selects nothing, options out of range.
+        MemoryError: more particles than the device has memory for; the message says how much each takes.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class Simulation:
             raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
         self.dilation = dilation
         box = _checked_box(periodic, self.space.dim)
+        check_memory(self.space, len(X), weight.support * dilation, not reference.fixed, self.device)
         counts = [len(body.x) for body in self.bodies]
         ends = np.cumsum([0, *counts])
         self.ranges = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}

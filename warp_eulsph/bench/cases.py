@@ -11,7 +11,8 @@ from ..materials import Material, NeoHookean
 from ..scheme.reference import Always, Every, Never, ReferencePolicy
 from ..simulation import Body, Simulation
 
-MODES: dict[str, ReferencePolicy] = {"total": Never(), "every_k": Every(10), "eulerian": Always()}
+STEPS_PER_REFRESH = 10  # of the mode every_k
+MODES: dict[str, ReferencePolicy] = {"total": Never(), "every_k": Every(STEPS_PER_REFRESH), "eulerian": Always()}
 DTYPES = {"float32": wp.float32, "float64": wp.float64}
 
 

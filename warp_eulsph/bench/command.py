@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass, field
 import warp as wp
 
 from .. import execution
-from .cases import CASES, DTYPES, BenchCase
+from ..memory import array_bytes
+from .cases import CASES, DTYPES, STEPS_PER_REFRESH, BenchCase
 from .machine import arithmetic, bandwidth
-from .memory import array_bytes
 from .phases import OTHER, PhaseClock
 from .roof import least_seconds
 
@@ -82,7 +82,9 @@ def run(case: BenchCase) -> Result:
     simulation.step(WARM_UP)
     start = time.perf_counter()
     simulation.step()
-    steps = max(1, round(SECONDS_PER_ROUND / (time.perf_counter() - start)))
+    # Whole periods of refreshes in every round
+    period = STEPS_PER_REFRESH if case.mode == "every_k" else 1
+    steps = period * max(1, round(SECONDS_PER_ROUND / (period * (time.perf_counter() - start))))
     wall, cpu = [], []
     for _ in range(ROUNDS):
         wall_start, cpu_start = time.perf_counter(), time.process_time()
@@ -125,7 +127,7 @@ def limits_of(dtype: str, threads: int) -> tuple[float, float]:
 
 
 def start_up_seconds(case: BenchCase) -> tuple[float, float]:
-    """Seconds of a fresh process that takes one small step of the case: kernels compiled, and from the cache."""
+    """Processor seconds of a fresh process that takes one small step of the case: kernels compiled, and cached."""
     code = (
         "import dataclasses, sys; from warp_eulsph.bench.cases import CASES\n"
         "case = next(case for case in CASES if case.name == sys.argv[1])\n"
@@ -134,11 +136,12 @@ def start_up_seconds(case: BenchCase) -> tuple[float, float]:
     seconds = []
     with tempfile.TemporaryDirectory() as cache:
         for _ in range(2):
-            start = time.perf_counter()
+            before = os.times()
             environment = {**os.environ, "WARP_CACHE_PATH": cache}
-            command = [sys.executable, "-c", code, case.name]
-            subprocess.run(command, env=environment, check=True, capture_output=True)
-            seconds.append(time.perf_counter() - start)
+            subprocess.run([sys.executable, "-c", code, case.name], env=environment, check=True, capture_output=True)
+            after = os.times()
+            user, system = after.children_user - before.children_user, after.children_system - before.children_system
+            seconds.append(user + system)
     return seconds[0], seconds[1]
 
 

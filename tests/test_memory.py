@@ -1,0 +1,52 @@
+"""What a simulation will take is known before it is built, and one that will not fit is refused with the number."""
+
+import logging
+
+import numpy as np
+import pytest
+import warp as wp
+
+import warp_eulsph as es
+from warp_eulsph import execution, memory
+
+SIDE = {1: 4000, 2: 80, 3: 20}
+
+
+def block(dim):
+    s = (np.arange(SIDE[dim]) + 0.5) / SIDE[dim]
+    x = np.stack(np.meshgrid(*[s] * dim, indexing="ij"), -1).reshape(-1, dim)
+    return es.Body(x=x, volume=float(SIDE[dim]) ** -dim, material=es.NeoHookean(density=1e3, young=1e7, poisson=0.3))
+
+
+@pytest.mark.parametrize("simd", [True, False])
+@pytest.mark.parametrize("dtype", [wp.float32, wp.float64])
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
+def test_estimate_is_near_what_is_allocated(dim, dtype, reference, simd, monkeypatch):
+    """Within a fifth: particles at the surface of so small a block have fewer neighbours."""
+    monkeypatch.setattr(execution, "_simd", simd)
+    simulation = es.Simulation(block(dim), reference=reference, dtype=dtype)
+    simulation.step(3)
+    taken = memory.array_bytes(simulation) / len(simulation.x)
+    moving = not reference.fixed
+    expected = memory.bytes_per_particle(simulation.space, 2.6, moving, "cpu")
+    assert 0.8 * taken < expected < 1.2 * taken
+
+
+def test_a_run_that_does_not_fit_is_refused_with_the_number(monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda device: 1_000_000)
+    with pytest.raises(
+        MemoryError, match=r"8000 particles take about 2\d\d\d bytes each, 0.02\d* GB, and 0.001 GB are"
+    ):
+        es.Simulation(block(3))
+
+
+def test_memory_is_reported_before_the_run(caplog):
+    with caplog.at_level(logging.INFO, logger="warp_eulsph.memory"):
+        es.Simulation(block(2))
+    assert "6400 particles take about" in caplog.text
+
+
+def test_available_memory_is_of_this_machine():
+    there = memory.available("cpu")
+    assert there is None or 1e7 < there < 1e14
