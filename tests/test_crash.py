@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from runs import contents, plate, recording, run
+from kept_runs import contents, plate, recording, run
 
 from warp_eulsph.output import DamagedError, read_snapshot, record
 from warp_eulsph.output.checkpoint import decode

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from runs import plate
+from kept_runs import plate
 
 import warp_eulsph as es
 from warp_eulsph.output import BodyProbe, PointProbe, ReactionProbe, SectionProbe

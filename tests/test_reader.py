@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import warp as wp
-from runs import UNTIL, plate, recording, run
+from kept_runs import UNTIL, plate, recording, run
 from test_snapshots import pad
 
 import warp_eulsph as es

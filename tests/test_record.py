@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from runs import UNTIL, StopAfter, contents, plate, recording, run
+from kept_runs import UNTIL, StopAfter, contents, plate, recording, run
 
 import warp_eulsph as es
 from warp_eulsph.output import (
