@@ -43,7 +43,7 @@ class Balance:
 
     Args:
         sweeps: relaxation sweeps per refresh, from ψ = 0.
-        bound: largest |x̂ − x| over the particle's spacing.
+        bound: largest |x̂ − x| over the particle's spacing in the reference.
         lean: largest λ; 0 closes alike in all directions.
     """
 
@@ -151,7 +151,7 @@ def _make_shift(space: Space) -> Any:
         lean: real,
     ):
         a = first + wp.tid()
-        spacing = particles.spacing[a]
+        spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
         away = psi[a] * real(0.5)
         disorder = wp.dot(away, away) / (spacing * spacing)
         share = lean * disorder / (disorder + real(LEANING * LEANING))
