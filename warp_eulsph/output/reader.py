@@ -9,9 +9,11 @@ from typing import Any, overload
 
 import numpy as np
 
+from .. import weights
 from .directory import RunDirectory
 from .log import read_log
 from .manifest import Entry, Manifest
+from .shape_functions import shape_functions
 from .snapshot import read_field, read_units
 from .tables import read_table
 
@@ -24,6 +26,27 @@ DERIVED = {
 }
 
 
+#: What ``RunFrame.interpolate`` needs of the snapshots besides the field itself.
+INTERPOLATION = ("volume", "smoothing_length", "body")
+
+
+def points_on_line(start: Sequence[float], end: Sequence[float], count: int) -> np.ndarray:
+    """``count`` points from ``start`` to ``end`` [m], both among them, evenly spaced: (count, dim)."""
+    return np.linspace(np.asarray(start, dtype=float), np.asarray(end, dtype=float), count)
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """How the particles of a run see each other.
+
+    Attributes:
+        weight: SPH weight. box: lengths [m] of the periodic box, 0 where it is open; all open if empty.
+    """
+
+    weight: weights.Weight = weights.CubicSpline()
+    box: tuple[float, ...] = ()
+
+
 class RunFrame:
     """One snapshot; fields are read when they are asked for, and kept.
 
@@ -31,8 +54,8 @@ class RunFrame:
         path: of the file. time: [s]. step: steps taken before it. N: number of particles.
     """
 
-    def __init__(self, directory: Path, entry: Entry):
-        self.path = directory / entry.name
+    def __init__(self, directory: Path, entry: Entry, smoothing: Smoothing = Smoothing()):
+        self.path, self._smoothing = directory / entry.name, smoothing
         self.time, self.step, self.N = entry.time, entry.step, entry.particles
         self._fields: dict[str, np.ndarray] = {}
 
@@ -107,6 +130,48 @@ class RunFrame:
         """SI units of the fields in the file, by name."""
         return {"x": "m", **read_units(self.path)}
 
+    def field(self, name: str) -> np.ndarray:
+        """A field by its name, one of the file or one of those derived: (N, …).
+
+        Raises:
+            KeyError: the file has no such field, or not what it derives from.
+        """
+        return getattr(self, name) if name in DERIVED else self[name]
+
+    def interpolate(self, points: np.ndarray, name: str) -> np.ndarray:
+        """A field at points of space: corrected SPH sums, exact for fields that are linear in the present positions.
+
+        Near a surface they extrapolate, up to about half a spacing beyond the outermost particles. Where bodies touch,
+        only the body with the nearest particle counts. The weight is the run's; the cubic spline where the package has
+        not got that.
+
+        Args:
+            points: [m], (m, dim), such as those of ``points_on_line``; in 1-D also (m,).
+            name: of a field, derived ones too.
+
+        Returns:
+            (m, …), not-a-number at points outside: no particle nearer than its smoothing length, or too few within
+            reach to span the space, as where matter is drawn out to several times its length.
+
+        Raises:
+            ValueError: points of another shape or not finite, or snapshots without ``INTERPOLATION``.
+            KeyError: no such field.
+        """
+        missing = [need for need in INTERPOLATION if need not in self.units]
+        if missing:
+            raise ValueError(
+                f"{self.path} must hold {', '.join(INTERPOLATION)} for values at points, it lacks {missing}; write "
+                "snapshots with these fields"
+            )
+        places, dim = np.array(points, dtype=float), self.x.shape[1]
+        if places.ndim == 1 and dim == 1:
+            places = places[:, None]
+        if places.ndim != 2 or places.shape[1] != dim or not np.isfinite(places).all():
+            raise ValueError(f"points must be (m, {dim}) finite numbers [m], got shape {np.shape(points)}: {points}")
+        values, (volume, h, body) = self.field(name), (self[need] for need in INTERPOLATION)
+        by = self._smoothing
+        return shape_functions(places, self.x, volume, h, by.weight, body=body, box=by.box).apply(values)
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -174,8 +239,14 @@ class Run(Sequence[RunFrame]):
 
     def __getitem__(self, index: int | slice) -> RunFrame | list[RunFrame]:
         if isinstance(index, slice):
-            return [RunFrame(self.directory.path, entry) for entry in self._entries[index]]
-        return RunFrame(self.directory.path, self._entries[index])
+            return [RunFrame(self.directory.path, entry, self._smoothing) for entry in self._entries[index]]
+        return RunFrame(self.directory.path, self._entries[index], self._smoothing)
+
+    @cached_property
+    def _smoothing(self) -> Smoothing:
+        simulation = self.description.get("simulation", {})
+        weight = getattr(weights, simulation.get("weight", ""), weights.CubicSpline)
+        return Smoothing(weight(), tuple(simulation.get("periodic", ())))
 
     def at(self, time: float) -> RunFrame:
         """The frame nearest to ``time`` [s]."""
@@ -259,13 +330,9 @@ class Run(Sequence[RunFrame]):
             if first.N != second.N:
                 raise ValueError(f"the runs must have the same particles, got {first.N} and {second.N}")
             for name in fields:
-                a, b = (_field(frame, name).astype(float).reshape(first.N, -1) for frame in (first, second))
+                a, b = (frame.field(name).astype(float).reshape(first.N, -1) for frame in (first, second))
                 apart = np.linalg.norm(a - b, axis=1)
                 rms[name].append(float(np.sqrt(np.mean(apart**2))))
                 largest[name].append(float(apart.max()))
         as_arrays = [{name: np.array(values) for name, values in found.items()} for found in (rms, largest)]
         return Comparison(self.times[mine], *as_arrays)
-
-
-def _field(frame: RunFrame, name: str) -> np.ndarray:
-    return getattr(frame, name) if name in DERIVED else frame[name]

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..fields import PARTICLES, STATE
+from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
 from ..simulation import Simulation
 from .atomic import replace_file
 from .stress import cauchy_stress, padded
@@ -36,6 +37,8 @@ SOURCES: dict[str, Callable[[Simulation], np.ndarray]] = {
     "V0": lambda simulation: simulation.particles.V0.numpy().copy(),
     "body": lambda simulation: simulation.particles.body.numpy().copy(),
     "share": lambda simulation: simulation.particles.share.numpy().copy(),
+    "h": lambda simulation: simulation.particles.h.numpy().copy(),
+    "particle": lambda simulation: np.arange(len(simulation.particles.mass), dtype=np.int32),
 }
 
 #: Every field that a snapshot can hold. Stress has nine components in any dimension: σ33 of plane strain counts.
@@ -58,6 +61,15 @@ FIELDS = {
     ),
     "body": SnapshotField(lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, ("body",)),
     "share": SnapshotField(lambda d: (), PARTICLES["share"].unit, PARTICLES["share"].meaning, ("share",)),
+    "volume": SnapshotField(lambda d: (), PARTICLES["V0"].unit, "volume", ("V0", "J"), lambda V0, J: V0 * J),
+    "smoothing_length": SnapshotField(
+        lambda d: (),
+        "m",
+        "smoothing length of the present configuration",
+        ("x", "h", "J"),
+        lambda x, h, J: h * np.clip(J ** (1.0 / x.shape[1]), LEAST_GROWTH, LARGEST_GROWTH),
+    ),
+    "particle": SnapshotField(lambda d: (), "-", "number of the particle in the simulation", ("particle",)),
 }
 
 
