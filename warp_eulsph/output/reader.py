@@ -125,6 +125,11 @@ class RunFrame:
         F = self.F.astype(float)
         return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(F.shape[1]))
 
+    @property
+    def particles(self) -> np.ndarray:
+        """Numbers of the particles in the simulation, (N,): all, unless a region was recorded."""
+        return self["particle"] if "particle" in self.units else np.arange(self.N)
+
     @cached_property
     def units(self) -> dict[str, str]:
         """SI units of the fields in the file, by name."""
@@ -315,7 +320,7 @@ class Run(Sequence[RunFrame]):
         """Differences of the same particles in both runs, at the times that both have.
 
         Raises:
-            ValueError: no common times, or different numbers of particles.
+            ValueError: no common times, or different particles.
         """
         _, mine, theirs = np.intersect1d(self.times, other.times, return_indices=True)
         if not len(mine):
@@ -327,8 +332,8 @@ class Run(Sequence[RunFrame]):
         largest: dict[str, list[float]] = {name: [] for name in fields}
         for i, j in zip(mine.tolist(), theirs.tolist(), strict=True):
             first, second = self[i], other[j]
-            if first.N != second.N:
-                raise ValueError(f"the runs must have the same particles, got {first.N} and {second.N}")
+            if not np.array_equal(first.particles, second.particles):
+                raise ValueError(f"the runs must have the same particles, got {first.N} and {second.N}, or other ones")
             for name in fields:
                 a, b = (frame.field(name).astype(float).reshape(first.N, -1) for frame in (first, second))
                 apart = np.linalg.norm(a - b, axis=1)

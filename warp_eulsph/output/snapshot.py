@@ -131,11 +131,11 @@ class Frame:
         return {name: field.values(*(self.sources[source] for source in field.sources)) for name, field in fields}
 
 
-def collect(simulation: Simulation, names: Iterable[str]) -> Frame:
-    """What the fields of these ``names`` are made of in the present state, copied."""
-    names = tuple(names)
+def collect(simulation: Simulation, names: Iterable[str], particles: np.ndarray | None = None) -> Frame:
+    """What the fields of these ``names`` are made of in the present state, copied; of all ``particles`` if None."""
+    names, chosen = tuple(names), slice(None) if particles is None else particles
     needed = dict.fromkeys(["x", *(source for name in names for source in FIELDS[name].sources)])
-    sources = {name: SOURCES[name](simulation) for name in needed}
+    sources = {name: SOURCES[name](simulation)[chosen] for name in needed}
     return Frame(simulation.t, simulation.steps, simulation.space.dim, names, sources)
 
 
