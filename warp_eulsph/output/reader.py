@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from .manifest import Entry, Manifest
 from .shape_functions import shape_functions
 from .snapshot import read_field, read_units
 from .tables import read_table
+
+if TYPE_CHECKING:
+    import xarray
 
 #: Units of the fields that a frame derives from those it holds.
 DERIVED = {
@@ -315,6 +318,27 @@ class Run(Sequence[RunFrame]):
         """``done``, ``stopped``, ``unstable``, ``failed``, ``running``, or ``killed``: it was running and is not."""
         state = self.status.get("state", "unknown")
         return "killed" if state == "running" and not self.directory.busy else state
+
+    def to_xarray(self, fields: Sequence[str] | None = None) -> "xarray.Dataset":
+        """All frames as a data set; values are read from the snapshots when they are looked at, and not kept.
+
+        Dimensions are ``time`` [s] and ``particle``, by its number in the simulation, for vectors ``axis`` and for
+        tensors ``axis_2`` too, both by their letters. Those of the stress, which has nine components in any dimension,
+        are ``stress_axis`` and ``stress_axis_2``. Principal values have a dimension of their own, least first. SI units
+        are the attribute ``units``.
+
+        Args:
+            fields: names, derived ones too; by default all that the snapshots hold.
+
+        Raises:
+            ModuleNotFoundError: xarray is not installed.
+            ValueError: unknown fields, no snapshots, or numbers of particles that change.
+        """
+        try:
+            from .labelled import dataset
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError("data sets need xarray: pip install 'warp_eulsph[xarray]'") from None
+        return dataset(self, fields)
 
     def compare(self, other: "Run", fields: Sequence[str] = ("x",)) -> Comparison:
         """Differences of the same particles in both runs, at the times that both have.
