@@ -67,6 +67,14 @@ def test_shares_are_the_sums_written_out():
     assert found.share == pytest.approx(wanted[q < 2], rel=1e-12)
 
 
+def test_many_points_go_block_by_block(tmp_path, monkeypatch):
+    frame = frame_of(es.Simulation(block(2, velocity=[1.0, 2.0])), tmp_path)
+    points = np.random.default_rng(0).uniform(0, 1, (10, 2))
+    whole = frame.interpolate(points, "x")
+    monkeypatch.setattr("warp_eulsph.output.reader._BLOCK", 4)
+    assert np.array_equal(frame.interpolate(points, "x"), whole) and whole == pytest.approx(points, abs=1e-13)
+
+
 def test_outside_is_not_a_number(tmp_path):
     frame = frame_of(es.Simulation(block(2)), tmp_path)
     points = np.array([[0.5, 0.5], [1.0, 1.0], [1.0 + 2 * SPACING, 0.5], [50.0, -1e9], [0.5, 0.3]])

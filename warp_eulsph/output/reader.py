@@ -31,6 +31,8 @@ DERIVED = {
 
 #: What ``RunFrame.interpolate`` needs of the snapshots besides the field itself.
 INTERPOLATION = ("volume", "smoothing_length", "body")
+# Points whose neighbours are in memory at once, some hundred each.
+_BLOCK = 20_000
 
 
 def points_on_line(start: Sequence[float], end: Sequence[float], count: int) -> np.ndarray:
@@ -177,8 +179,10 @@ class RunFrame:
         if places.ndim != 2 or places.shape[1] != dim or not np.isfinite(places).all():
             raise ValueError(f"points must be (m, {dim}) finite numbers [m], got shape {np.shape(points)}: {points}")
         values, (volume, h, body) = self.field(name), (self[need] for need in INTERPOLATION)
-        by = self._smoothing
-        return shape_functions(places, self.x, volume, h, by.weight, body=body, box=by.box).apply(values)
+        weight, box = self._smoothing.weight, self._smoothing.box
+        blocks = np.split(places, range(_BLOCK, len(places), _BLOCK))
+        found = [shape_functions(p, self.x, volume, h, weight, body=body, box=box).apply(values) for p in blocks]
+        return np.concatenate(found)
 
 
 @dataclass(frozen=True)

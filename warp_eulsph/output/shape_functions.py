@@ -113,16 +113,16 @@ def _pairs(points: np.ndarray, x: np.ndarray, reach: float) -> tuple[np.ndarray,
     strides = np.cumprod([1, *(last[:-1] + 7)])
     keys = cell @ strides
     order = np.argsort(keys, kind="stable")
-    keys = keys[order]
+    keys, x = keys[order], x[order]
     found = []
-    for step in itertools.product((-1, 0, 1), repeat=dim):
-        wanted = (home + step) @ strides
-        first = np.searchsorted(keys, wanted)
-        count = np.searchsorted(keys, wanted, side="right") - first
+    for step in itertools.product((-1, 0, 1), repeat=dim - 1):
+        row = (home + (0, *step)) @ strides  # three cells along the first axis follow each other
+        first, end = np.searchsorted(keys, row - 1), np.searchsorted(keys, row + 1, side="right")
+        count = end - first
         i = np.repeat(np.arange(len(points)), count)
-        b = order[np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)]
-        near = np.square(x[b] - points[i]).sum(axis=1) < reach**2
-        found.append((i[near], b[near]))
+        k = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
+        near = np.square(x[k] - points[i]).sum(axis=1) < reach**2
+        found.append((i[near], order[k[near]]))
     i, b = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort((b, i))
     return i[order], b[order]
