@@ -48,6 +48,10 @@ class BodyTable(Table):
     velocity: PlaceFormula = Field(0.0, validate_default=True, description="initial velocity [m/s]")
     volume: PlaceFormula | None = Field(None, description="volumes [m^dim] instead of those of the shape")
     spacing: PlaceFormula | None = Field(None, description="spacings [m]; the dim-th root of the volume by default")
+    surface: PlaceFormula | None = Field(
+        None,
+        description="outward area vectors [m^(dim-1)] of the particles, 0 inside; as the shape has them by default",
+    )
     mirror: list[MirrorPlane] = Field([], description="planes behind which the body gets mirror ghosts")
 
     @property
@@ -70,7 +74,7 @@ class BodyTable(Table):
             spacing=None if self.spacing is None else self.spacing.at(x)[:, 0],
             material=self.material.make(),
             velocity=self.velocity.at(x),
-            surface=surface[0] if surface else None,
+            surface=self.surface.at(x) if self.surface is not None else surface[0] if surface else None,
             name=name,
         )
 

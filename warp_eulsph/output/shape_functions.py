@@ -116,7 +116,7 @@ def _pairs(points: np.ndarray, x: np.ndarray, reach: float) -> tuple[np.ndarray,
     keys, x = keys[order], x[order]
     found = []
     for step in itertools.product((-1, 0, 1), repeat=dim - 1):
-        row = (home + (0, *step)) @ strides  # three cells along the first axis follow each other
+        row = (home + np.array([0, *step])) @ strides  # three cells along the first axis follow each other
         first, end = np.searchsorted(keys, row - 1), np.searchsorted(keys, row + 1, side="right")
         count = end - first
         i = np.repeat(np.arange(len(points)), count)
