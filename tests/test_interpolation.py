@@ -59,9 +59,9 @@ def test_shares_are_the_sums_written_out():
     q = np.abs(x[:, 0] - p) / h
     w = np.where(q < 1, 1 - 1.5 * q**2 + 0.75 * q**3, np.where(q < 2, 0.25 * (2 - q) ** 3, 0.0))
     VW = volume * w * 2 / (3 * h)
-    M0, M1, M2 = (float((VW * (p - x[:, 0]) ** k).sum()) for k in range(3))
-    beta = -M1 / M2
-    wanted = VW * (1 + beta * (p - x[:, 0])) / (M0 + beta * M1)
+    S0, S1, S2 = (float((VW * (p - x[:, 0]) ** k).sum()) for k in range(3))
+    beta = -S1 / S2
+    wanted = VW * (1 + beta * (p - x[:, 0])) / (S0 + beta * S1)
     found = shape_functions(np.array([[p]]), x, volume, h, es.CubicSpline())
     assert found.particle.tolist() == np.flatnonzero(q < 2).tolist()
     assert found.share == pytest.approx(wanted[q < 2], rel=1e-12)
@@ -82,6 +82,7 @@ def test_outside_is_not_a_number(tmp_path):
     assert np.isnan(density).tolist() == [False, False, True, True, False]
     assert density[[0, 1, 4]] == pytest.approx(1100.0, rel=1e-12)
     assert np.isnan(frame.interpolate(points, "velocity")[2]).all()
+    assert np.isnan(frame.interpolate([[9.0, 9.0]], "velocity")).all()
     assert frame.interpolate(np.zeros((0, 2)), "velocity").shape == (0, 2)
 
 
@@ -89,6 +90,15 @@ def test_neighbours_in_a_row_do_not_span_a_plane():
     x = np.stack([np.arange(8.0), np.zeros(8)], axis=1)
     found = shape_functions(np.array([[3.5, 0.0]]), x, np.ones(8), np.full(8, 1.3), es.CubicSpline())
     assert not found.inside[0] and len(found.share) == 0
+
+
+def test_bodies_of_very_different_resolution():
+    """Whether neighbours span the space does not depend on the unit of length, nor on what else there is."""
+    coarse, fine = box((0.0, 0.0), (8.0, 8.0), 1.0)[0], box((0.0, 0.0), (8.0, 8.0), 1.0)[0] * 1e-5 + [10.0, 0.0]
+    x, h = np.concatenate([coarse, fine]), np.repeat([1.3, 1.3e-5], 64)
+    body, points = np.repeat([0, 1], 64), np.array([[4.1, 4.2], [10.0 + 4.1e-5, 4.2e-5]])
+    found = shape_functions(points, x, h**2, h, es.CubicSpline(), body=body)
+    assert found.inside.all() and found.apply(x) == pytest.approx(points, abs=1e-13)
 
 
 def test_only_the_nearest_body_counts(tmp_path):

@@ -63,18 +63,19 @@ class BodyTable(Table):
     def build(self, name: str) -> Body:
         """The body, without ghosts."""
         try:
-            x, volume, *surface = self.shape.make()
+            x, volume, *given = self.shape.make()
         except ValueError as error:
             raise ValueError(f"body.{name}.shape: {error}") from None
         except MemoryError:
             raise ValueError(f"body.{name}.shape: it does not fit into memory; increase the spacing") from None
+        surface = given[0] if given else None
         return Body(
             x=x,
             volume=volume if self.volume is None else self.volume.at(x)[:, 0],
             spacing=None if self.spacing is None else self.spacing.at(x)[:, 0],
             material=self.material.make(),
             velocity=self.velocity.at(x),
-            surface=self.surface.at(x) if self.surface is not None else surface[0] if surface else None,
+            surface=surface if self.surface is None else self.surface.at(x),
             name=name,
         )
 

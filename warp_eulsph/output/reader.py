@@ -151,17 +151,17 @@ class RunFrame:
     def interpolate(self, points: np.ndarray, name: str) -> np.ndarray:
         """A field at points of space: corrected SPH sums, exact for fields that are linear in the present positions.
 
-        Near a surface they extrapolate, up to about half a spacing beyond the outermost particles. Where bodies touch,
-        only the body with the nearest particle counts. The weight is the run's; the cubic spline where the package has
-        not got that.
+        They extrapolate up to a smoothing length beyond the outermost particles, which the surface is within. Where
+        bodies touch, only the body with the nearest particle counts. The weight is the run's, or the cubic spline
+        where that is none of the package's.
 
         Args:
             points: [m], (m, dim), such as those of ``points_on_line``; in 1-D also (m,).
             name: of a field, derived ones too.
 
         Returns:
-            (m, …), not-a-number at points outside: no particle nearer than its smoothing length, or too few within
-            reach to span the space, as where matter is drawn out to several times its length.
+            (m, …), not-a-number at points outside: no particle is nearer than its smoothing length, or those within
+            reach do not span the space, as where matter is drawn out to several times its length.
 
         Raises:
             ValueError: points of another shape or not finite, or snapshots without ``INTERPOLATION``.

@@ -53,7 +53,7 @@ def shape_functions(
     """Shape functions of particles at points, exact for linear fields.
 
     A point is inside where a particle is nearer than its smoothing length and the particles within reach span the
-    space; about half a spacing beyond the outermost particles is inside, and values are extrapolated there.
+    space: values are extrapolated up to a smoothing length beyond the outermost particles, which the surface is within.
 
     Args:
         points: [m], (m, dim).
@@ -79,7 +79,9 @@ def shape_functions(
         kept &= body[b] == of[i]
     i, b, r = i[kept], b[kept], r[kept]
     weights = volume[b] * _weights(r, h[b], weight, x.shape[1])
-    spanned, share = _corrected(i, (x[b] - points[i]) / h.max(), weights, len(points))
+    # Offsets in units of a smoothing length, so that the condition of their moments is a number of its own
+    length = np.bincount(i, h[b], minlength=len(points)) / np.bincount(i, minlength=len(points)).clip(1)
+    spanned, share = _corrected(i, (x[b] - points[i]) / length[i, None], weights, len(points))
     inside = spanned & (nearest < 1.0)
     kept = inside[i]
     return ShapeFunctions(inside, i[kept], source[b[kept]], share[kept])
