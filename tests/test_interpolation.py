@@ -137,6 +137,15 @@ def test_the_weight_is_that_of_the_run(tmp_path):
     assert np.abs(by_hand[0] - by_hand[1]).max() > 1e-3
 
 
+def test_frames_of_a_run_with_a_damaged_description_open(tmp_path):
+    record(es.Simulation(block(2)), tmp_path, 1e-9)
+    (tmp_path / "run.json").write_text("{")
+    frame = Run(tmp_path)[0]
+    assert frame.x.shape == (25, 2)
+    with pytest.raises(ValueError, match=r"run\.json is damaged"):
+        frame.interpolate([[0.5, 0.5]], "velocity")
+
+
 def test_cells_find_the_neighbours_that_all_pairs_give():
     rng = np.random.default_rng(7)
     x, points = rng.normal(size=(300, 3)), rng.normal(size=(40, 3))

@@ -1,6 +1,6 @@
 """A run read back: ``Run("runs/column")[-1].F``."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -27,7 +27,6 @@ DERIVED = {
     "principal_stretches": "-",
     "green_lagrange": "-",
 }
-
 
 #: What ``RunFrame.interpolate`` needs of the snapshots besides the field itself.
 INTERPOLATION = ("volume", "smoothing_length", "body")
@@ -59,8 +58,8 @@ class RunFrame:
         path: of the file. time: [s]. step: steps taken before it. N: number of particles.
     """
 
-    def __init__(self, directory: Path, entry: Entry, smoothing: Smoothing = Smoothing()):
-        self.path, self._smoothing = directory / entry.name, smoothing
+    def __init__(self, directory: Path, entry: Entry, smoothing: Callable[[], Smoothing] = Smoothing):
+        self.path, self._smoothing = directory / entry.name, smoothing  # asked only when values at points are
         self.time, self.step, self.N = entry.time, entry.step, entry.particles
         self._fields: dict[str, np.ndarray] = {}
 
@@ -179,9 +178,10 @@ class RunFrame:
         if places.ndim != 2 or places.shape[1] != dim or not np.isfinite(places).all():
             raise ValueError(f"points must be (m, {dim}) finite numbers [m], got shape {np.shape(points)}: {points}")
         values, (volume, h, body) = self.field(name), (self[need] for need in INTERPOLATION)
-        weight, box = self._smoothing.weight, self._smoothing.box
-        blocks = np.split(places, range(_BLOCK, len(places), _BLOCK))
-        found = [shape_functions(p, self.x, volume, h, weight, body=body, box=box).apply(values) for p in blocks]
+        by, found = self._smoothing(), []
+        for block in np.split(places, range(_BLOCK, len(places), _BLOCK)):
+            functions = shape_functions(block, self.x, volume, h, by.weight, body=body, box=by.box)
+            found.append(functions.apply(values))
         return np.concatenate(found)
 
 
@@ -254,7 +254,6 @@ class Run(Sequence[RunFrame]):
             return [RunFrame(self.directory.path, entry, self._smoothing) for entry in self._entries[index]]
         return RunFrame(self.directory.path, self._entries[index], self._smoothing)
 
-    @cached_property
     def _smoothing(self) -> Smoothing:
         simulation = self.description.get("simulation", {})
         weight = getattr(weights, simulation.get("weight", ""), weights.CubicSpline)
