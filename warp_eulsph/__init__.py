@@ -36,6 +36,7 @@ from .materials import (
     TaitLiquid,
 )
 from .operators.values import Linear, Shepard
+from .order import spatial_order
 from .scheme.balance import Balance
 from .scheme.dissipation import Upwind
 from .scheme.health import UnstableError
@@ -111,4 +112,5 @@ __all__ = [
     "WendlandC6",
     "WhenDistorted",
     "mirror",
+    "spatial_order",
 ]

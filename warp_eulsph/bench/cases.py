@@ -8,6 +8,7 @@ import warp as wp
 
 from ..geometry import box
 from ..materials import Material, NeoHookean
+from ..order import spatial_order
 from ..scheme.reference import Always, Every, Never, ReferencePolicy
 from ..simulation import Body, Simulation
 
@@ -27,6 +28,7 @@ class BenchCase:
         mode: "total", "every_k" (refreshed every tenth step) or "eulerian".
         side: particles along each axis.
         threads: threads on the CPU.
+        order: of the particles in memory: that of the lattice, "shuffled", or shuffled and then "sorted" in space.
         material: law of the block.
     """
 
@@ -36,12 +38,18 @@ class BenchCase:
     mode: str
     side: int
     threads: int = 1
+    order: str = "lattice"
     material: Material = NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 
     def build(self) -> Simulation:
         """The block: lattice with a jitter of a tenth of the spacing, 74 neighbours in 3-D, far from rest."""
         x, volume = box((0.0,) * self.dim, (1.0,) * self.dim, 1.0 / self.side)
-        x = x + np.random.default_rng(0).uniform(-0.1, 0.1, x.shape) / self.side
+        rng = np.random.default_rng(0)
+        x = x + rng.uniform(-0.1, 0.1, x.shape) / self.side
+        if self.order != "lattice":
+            rng.shuffle(x)
+        if self.order == "sorted":
+            x = x[spatial_order(x, 1.0 / self.side)]
         velocity = np.zeros_like(x)
         velocity[:, -1] = 10.0 * np.sin(3.0 * x[:, 0])
         if self.dim > 1:
@@ -61,6 +69,8 @@ def _all() -> Iterator[BenchCase]:
             yield BenchCase(f"{mode}-3d-{dtype}-2-threads", 3, dtype, mode, 37, threads=2)
         for size, side in (("10k", 22), ("100k", 46), ("400k", 74), ("1M", 100)):
             yield BenchCase(f"{mode}-3d-float64-{size}", 3, "float64", mode, side)
+        for order in ("shuffled", "sorted"):
+            yield BenchCase(f"{mode}-3d-float64-{order}", 3, "float64", mode, 74, order=order)
     yield BenchCase("small-1d-float64", 1, "float64", "total", 40)
     yield BenchCase("small-1d-float64-eulerian", 1, "float64", "eulerian", 40)
 

@@ -104,7 +104,7 @@ def judge(problem: Problem, name: str, level: int) -> Iterator[Verdict]:
 
 def _advance(simulation: Simulation, until: float, least: float) -> bool:
     """Step to the time ``until`` [s]; False once ``MOST_STEPS`` are taken, or steps are shorter than ``least`` [s]."""
-    while until - simulation.t > 2.0 * simulation.dt:
+    while until - simulation.t > 2.0 * simulation.clock.free_dt:  # the last step may have been cut to hit a time
         simulation.step()
         if simulation.steps > MOST_STEPS or simulation.dt < least:
             return False
