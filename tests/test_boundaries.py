@@ -331,8 +331,8 @@ def test_bar_is_nodally_exact_at_courant_number_two():
 @pytest.mark.parametrize(
     ("condition", "message"),
     [
-        (es.Fixed(lambda X: X[:, 0] > 99.0), r"the region selects no particle; positions lie in .* bodies are"),
-        (es.Fixed([]), "the region selects no particle"),
+        (es.Fixed(lambda X: X[:, 0] > 99.0), r"^Fixed: the region selects no particle; positions lie in .* bodies are"),
+        (es.Fixed([]), "^Fixed: the region selects no particle"),
         (es.Fixed(body="plate"), r"body must be one of \['body'\], got 'plate'"),
         (es.Fixed(lambda X: X[:, 0]), r"predicate must return \(20,\) bool .* got \(20,\) float64"),
         (es.Fixed(lambda X: X > 0.0), r"predicate must return \(20,\) bool .* got \(20, 2\) bool"),

@@ -21,8 +21,10 @@ from warp_eulsph.validation.cases import (
     bar,
     bending_column,
     drop,
+    kinematic_vortex,
     piston,
     punch,
+    shear,
     spinning_cube,
     spinning_plate,
     twisting_column,
@@ -36,8 +38,10 @@ PYTHON = {
     "bar_limited": (40, lambda n: bar.build(n, es.Always(), bar.LIMITED)),
     "bending_column": (6, lambda n: bending_column.build(2, n, es.Always())),
     "bending_column_3d": (3, lambda n: bending_column.build(3, n, es.Always())),
+    "kinematic_vortex": (16, lambda n: kinematic_vortex.build(n, 2.0)),
     "piston": (50, lambda n: piston.build(n, piston.PISTONS["compression_100"], es.Always())),
     "punch": (10, lambda n: punch.build(n, es.Always())[0]),
+    "shear": (8, lambda n: shear.build(n, es.Always())[0]),
     "spinning_cube": (5, lambda n: spinning_cube.build(n, es.Always())),
     "spinning_plate": (10, lambda n: spinning_plate.build(n, es.Always())),
     "twisting_column": (3, lambda n: twisting_column.build(n, es.Always())),
@@ -352,6 +356,22 @@ def test_recording_and_probes_from_a_file(tmp_path):
     assert set(run.probes) == {"top", "all", "pull", "cut"}
 
 
+@pytest.mark.parametrize("reading", ["file", "described"])
+def test_snapshots_of_a_region_of_a_file(tmp_path, reading):
+    data = small(until=1e-6, parameters={"top": 0.5}, output={"region": "y > top", "body": "b", "fields": ["velocity"]})
+    data["body"]["b"] = json.loads(json.dumps(data["body"]["a"]))
+    data["body"]["b"]["shape"] |= {"lower": [2, 0], "upper": [3, 1]}
+    case = parse_case(data)
+    case = parse_case(case.describe()) if reading == "described" else case
+    simulation = case.build()
+    record(simulation, tmp_path, case.until, case.recording(simulation), case=case.describe())
+    frame = Run(tmp_path)[-1]
+    X = np.concatenate([body.x for body in simulation.bodies])
+    wanted = np.flatnonzero((X[:, 1] > 0.5) & (X[:, 0] > 2.0))
+    assert len(wanted) == 8 and frame.particles.tolist() == wanted.tolist()
+    assert Run(tmp_path).description["case"]["output"]["region"] == "y > top"
+
+
 def test_bodies_by_name_and_periodic_boxes():
     data = small(periodic=[0, 4], boundary=[{"kind": "Velocity", "body": "b", "value": 2}])
     data["body"]["b"] = json.loads(json.dumps(data["body"]["a"]))
@@ -373,6 +393,10 @@ def test_meshes_are_found_beside_the_case_file(tmp_path):
     case = read_case(tmp_path / "case.toml")
     # All 48 particles lie half a spacing beneath a face but the two in the middle of the inner edge.
     assert case.dim == 3 and len(case.build().conditions[0].indices) == 46
+    case = read_case(tmp_path / "case.toml", ["output.region.file=angle.vtk", "output.region.depth=0.13"])
+    simulation = case.build()
+    kept = case.recording(simulation).particles(simulation)
+    assert kept.tolist() == simulation.conditions[0].indices.tolist()
     assert case.describe()["body"]["a"]["shape"]["file"] == str(tmp_path / "angle.vtk")
 
 
@@ -500,6 +524,9 @@ def test_all_mistakes_of_a_file_are_named_at_once(tmp_path):
         ({"probe": [{"kind": "ReactionProbe", "name": "a", "boundary": 0}]}, "probe.0.boundary: must be one of the 0"),
         ({"probe": [{"kind": "BodyProbe", "name": "a b"}]}, "probe.0: probe name must be of letters, digits, - and _"),
         ({"probe": [{"kind": "BodyProbe", "name": "a"}] * 2}, "probe.1.name: is taken by another, got 'a'"),
+        ({"output": {"region": "z < 1"}}, "output.region: ['z'] are not coordinates in 2-D"),
+        ({"output": {"region": True}}, "output.region: must be a comparison such as 'y < 0.1', got True"),
+        ({"output": {"body": "aa"}}, "output.body: unknown body 'aa'; did you mean 'a'?"),
         ({"output": {"at": [2, 1]}}, "output.at: times must be finite and increase"),
         ({"precision": "half"}, "precision: input should be 'double' or 'single', got 'half'"),
         ({"parameters": {"lambda": 3}}, "parameters.lambda: must be named by letters"),

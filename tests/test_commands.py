@@ -235,7 +235,8 @@ def test_documented_programs_run(tmp_path, monkeypatch, capsys):
     names = {}
     for block in blocks:
         exec(compile(block, "runs.md", "exec"), names)
-    assert names["run"].times[-1] == 0.03 and len(blocks) == 3
+    assert names["run"].times[-1] == 0.03 and len(blocks) == 4
+    assert names["data"].sizes["time"] == len(names["run"])
 
 
 def test_help_loads_no_pictures_no_meshes_no_hdf5():

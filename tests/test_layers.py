@@ -100,7 +100,7 @@ class TestFile:
         assert not [word for word in ("TO" + "DO", "FIX" + "ME", "X" * 3) if word in text]
 
 
-HEAVY = ("h5py", "matplotlib", "vtkmodules", "pyvista", "meshio", "PIL", "pydantic")
+HEAVY = ("h5py", "matplotlib", "vtkmodules", "pyvista", "meshio", "PIL", "pydantic", "xarray", "pandas")
 
 
 @pytest.mark.parametrize(

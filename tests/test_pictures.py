@@ -8,11 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from kept_runs import plate
 
 from warp_eulsph.cases import read_case
 from warp_eulsph.cli import main
 from warp_eulsph.commands.frames import chosen
-from warp_eulsph.output import Run, record
+from warp_eulsph.output import Recording, Run, record
 from warp_eulsph.output.export import export
 from warp_eulsph.pictures import Picture, film, picture, quantity
 from warp_eulsph.pictures.cells import corners, spacing
@@ -195,6 +196,22 @@ def test_csv_reads_back_to_the_same_numbers(run, tmp_path):
         found = np.array([row[f"deformation_gradient_x{axis}"] for row in last], dtype=np.float32)
         np.testing.assert_array_equal(found, snapshot.F[:, 0, i])
     assert [row["particle"] for row in last[:3]] == ["0", "1", "2"] and last[0]["body"] == "0"
+
+
+def test_csv_of_a_region_in_double_precision(tmp_path, monkeypatch):
+    """The numbers of the particles stand in their column once; blocks of rows follow each other."""
+    monkeypatch.setattr("warp_eulsph.output.export._BLOCK", 4)
+    simulation = plate()
+    simulation.step(3)
+    record(simulation, tmp_path / "run", 1e-3, Recording(region=[3, 4, 8, 9, 30, 35], dtype=np.float64))
+    frame = Run(tmp_path / "run")[0]
+    with export([frame], tmp_path / "a.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][:4] == ["time", "particle", "x", "y"] and len(set(rows[0])) == len(rows[0]) and len(rows) == 7
+    found = dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
+    assert found["particle"].tolist() == [3, 4, 8, 9, 30, 35] and (found["time"] == frame.time).all()
+    assert np.array_equal(found["y"], frame.x[:, 1]) and np.array_equal(found["pressure"], frame.pressure)
+    assert np.array_equal(found["cauchy_stress_xy"], frame.cauchy_stress[:, 0, 1]) and found["pressure"].all()
 
 
 def test_single_vtkhdf_in_vtk(run, tmp_path):

@@ -1,6 +1,7 @@
 """A run read back: lazily, by name, with derived fields; and by VTK, bit for bit, wherever the folder is."""
 
 import json
+import sys
 import time
 
 import h5py
@@ -102,6 +103,64 @@ def test_comparison_of_two_runs(directory, tmp_path):
     lonely.write(simulation)
     with pytest.raises(ValueError, match="no time in common"):
         Run(directory).compare(Run(tmp_path / "lonely"))
+
+
+def test_data_set_has_labels_and_units(directory):
+    run = Run(directory)
+    data = run.to_xarray([*run.fields])
+    assert data.time.values.tolist() == run.times.tolist() and data.step.values.tolist() == run.steps.tolist()
+    assert dict(data.sizes) == {
+        "time": 6,
+        "particle": 36,
+        "axis": 2,
+        "axis_2": 2,
+        "stress_axis": 3,
+        "stress_axis_2": 3,
+        "principal_stresses_order": 3,
+        "principal_stretches_order": 2,
+    }
+    assert set(data) == {*run.fields} - {"particle"} and data.particle.values.tolist() == list(range(36))
+    for name in data:
+        assert data[name].attrs["units"] == run.units[name]
+        assert data[name].values.dtype == run[-1].field(name).dtype
+        for k, frame in enumerate(run):
+            assert np.array_equal(data[name][k], frame.field(name))
+    assert data.velocity.attrs["long_name"] == "velocity" and data.time.attrs["units"] == "s"
+    last = run[-1]
+    assert data.velocity.sel(axis="y", particle=7)[-1] == last.v[7, 1]
+    assert data.cauchy_stress.isel(time=-1).sel(stress_axis="z", stress_axis_2="z")[5] == last.cauchy_stress[5, 2, 2]
+    sheared = data.deformation_gradient.isel(time=-1).sel(axis="x", axis_2="y").values
+    assert np.array_equal(sheared, last.F[:, 0, 1])
+    assert "von_mises" not in run.to_xarray()
+
+
+def test_data_set_reads_only_what_is_looked_at(directory, monkeypatch):
+    from warp_eulsph.output import reader
+
+    run = Run(directory)
+    data, read = run.to_xarray(["velocity", "von_mises"]), []
+    whole = reader.read_field
+    monkeypatch.setattr(reader, "read_field", lambda path, name: read.append((path.stem, name)) or whole(path, name))
+    found = data.velocity.sel(time=8.1e-4, method="nearest").isel(particle=[3, 30, 4])
+    assert read == []
+    assert np.array_equal(found.values, run.at(8e-4).v[[3, 30, 4]])
+    assert set(read) == {(run.at(8e-4).path.stem, "velocity")}
+    assert np.array_equal(data.von_mises[::-2].values, np.stack([frame.von_mises for frame in run[::-2]]))
+    assert data.velocity[3:3].shape == data.velocity[3:3].values.shape == (0, 36, 2)
+
+
+def test_data_set_of_a_region_and_what_is_wrong(directory, tmp_path, monkeypatch):
+    record(plate(), tmp_path / "some", 1e-4, Recording(region=[4, 9, 35], fields=["J"]))
+    run = Run(tmp_path / "some")
+    data = run.to_xarray()
+    assert data.particle.values.tolist() == [4, 9, 35] and set(data) == {"x", "J"}
+    assert float(data.J.sel(particle=35)[-1]) == run[-1].J[2]
+    with pytest.raises(ValueError, match=r"fields must be among \['x', 'J', .*\], got \['velocity'\]"):
+        run.to_xarray(["J", "velocity"])
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.delitem(sys.modules, "warp_eulsph.output.labelled")
+    with pytest.raises(ModuleNotFoundError, match=r"data sets need xarray: pip install 'warp_eulsph\[xarray\]'"):
+        run.to_xarray()
 
 
 def test_no_run_is_an_error(tmp_path):

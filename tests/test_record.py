@@ -17,6 +17,7 @@ from warp_eulsph.output import (
     DamagedError,
     PointProbe,
     Recording,
+    Run,
     RunDirectory,
     Stop,
     read_snapshot,
@@ -261,6 +262,75 @@ def test_recording_at_given_times_and_without_interval(tmp_path):
     assert [float.fromhex(entry["time"]) for entry in entries] == [0.0, 1e-4, 7e-4, 1e-3]
     snapshot = read_snapshot(tmp_path / entries[-1]["name"])
     assert set(snapshot.fields) == {"J"} and np.array_equal(snapshot.x, simulation.x)
+
+
+EDGE = [k for k in range(36) if plate().x[k, 0] > 0.5]
+
+
+@pytest.mark.parametrize(
+    "region", [lambda X: X[:, 0] > 0.5, EDGE, np.isin(np.arange(36), EDGE)], ids=["predicate", "numbers", "mask"]
+)
+def test_snapshots_of_a_region_hold_its_particles_and_nothing_else_changes(whole, tmp_path, region):
+    simulation = plate()
+    record(simulation, tmp_path, UNTIL, recording(simulation, region=region))
+    assert 0 < len(EDGE) < 36
+    for frame, full in zip(Run(tmp_path), Run(whole[0]), strict=True):
+        assert (frame.time, frame.step, frame.N) == (full.time, full.step, len(EDGE))
+        assert frame.particles.tolist() == EDGE and full.particles.tolist() == list(range(36))
+        for name in full.units:
+            assert np.array_equal(frame[name], full[name][EDGE]), name
+    mine, all_ = contents(tmp_path), contents(whole[0])
+    for name in ("log.jsonl", "corner", "whole", "hold", "middle", "state"):  # all particles, checkpoints too
+        assert mine[name] == all_[name]
+    manifest = [json.loads(line) for line in (tmp_path / "manifest.jsonl").read_text().splitlines()]
+    assert {line["N"] for line in manifest} == {len(EDGE)}
+    kept = json.loads((tmp_path / "run.json").read_text())["recording"]
+    assert kept["particles"]["shape"] == [len(EDGE)] and kept["region"] is not None
+    assert json.loads((whole[0] / "run.json").read_text())["recording"]["particles"] is None
+    with pytest.raises(ValueError, match="must have the same particles, got 18 and 36"):
+        Run(tmp_path).compare(Run(whole[0]))
+
+
+def test_a_run_of_a_region_resumes_bit_for_bit_and_under_no_other_region(tmp_path):
+    def go(directory, limit=0.5, **options):
+        simulation = plate()
+        kept = recording(simulation, region=lambda X: X[:, 0] > limit, fields=["velocity"])
+        return record(simulation, directory, UNTIL, kept, **options)
+
+    go(tmp_path / "whole")
+    stop = StopAfter(3, 7)
+    go(tmp_path / "parts", stop=stop, watch=stop.watch)
+    with pytest.raises(ChangedCaseError, match=r"recording\.region\.enclosed\.limit: 0\.5, now 0\.4"):
+        go(tmp_path / "parts", limit=0.4, resume=True)
+    while go(tmp_path / "parts", resume=True, stop=stop, watch=stop.watch).stopped is not None:
+        pass
+    assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
+    assert Run(tmp_path / "parts").fields == ["x", "particle", "velocity"]
+
+
+def test_snapshots_of_one_body(tmp_path):
+    x = plate().bodies[0].x
+    rubber = plate().bodies[0].material
+    two = [es.Body(x=x + 2.0 * k, volume=1 / 36, material=rubber, name=name) for k, name in enumerate(("a", "b"))]
+    simulation = es.Simulation(two)
+    record(simulation, tmp_path, 1e-5, Recording(body="b", region=lambda X: X[:, 0] < 2.5))
+    frame = Run(tmp_path)[-1]
+    assert frame.N == 18 and frame.particles.min() >= 36 and (frame["body"] == 1).all()
+    assert frame.interpolate([[2.3, 2.5]], "x") == pytest.approx(np.array([[2.3, 2.5]]), abs=1e-6)  # single precision
+
+
+def test_wrong_regions_are_told_before_files_move(tmp_path):
+    run(tmp_path, until=1e-4)
+    before = contents(tmp_path)
+    for changes, message in [
+        ({"region": lambda X: X[:, 0] > 9.0}, "Recording: the region selects no particle"),
+        ({"region": [36]}, r"Recording: region indices must be integers in \[0, 36\)"),
+        ({"region": lambda X: X}, r"Recording: a region predicate must return \(36,\) bool"),
+        ({"body": "plat"}, r"Recording: body must be one of \['plate'\], got 'plat'"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            record(plate(), tmp_path, 1e-3, Recording(**changes), replace=True)
+    assert contents(tmp_path) == before
 
 
 def test_wrong_probes_are_told_before_files_move(tmp_path):

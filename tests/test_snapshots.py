@@ -71,7 +71,7 @@ def test_read_back_bit_for_bit(simulation, tmp_path, dtype):
     assert set(snapshot.fields) == set(FIELDS)
     for name, values in snapshot.fields.items():
         assert values.shape == (n, *FIELDS[name].shape(d)), name
-        assert values.dtype == (np.int32 if name == "body" else dtype), name
+        assert values.dtype == (np.int32 if name in ("body", "particle") else dtype), name
         assert snapshot.units[name] == FIELDS[name].unit
     assert snapshot.units["cauchy_stress"] == "Pa" and snapshot.units["velocity"] == "m/s"
 
@@ -86,6 +86,10 @@ def test_derived_fields_against_the_law_written_by_hand(simulation, tmp_path):
     np.testing.assert_allclose(fields["pressure"], -np.trace(sigma.T) / 3, rtol=0, atol=1e-13 * YOUNG)
     np.testing.assert_allclose(fields["J"], J, rtol=1e-14)
     np.testing.assert_allclose(fields["density"], DENSITY / J, rtol=1e-14)
+    d = simulation.space.dim
+    np.testing.assert_allclose(fields["volume"], 0.25**d * J, rtol=1e-14)
+    np.testing.assert_allclose(fields["smoothing_length"], 1.3 * 0.25 * J ** (1 / d), rtol=1e-14)
+    assert fields["particle"].tolist() == list(range(len(J)))
     assert np.abs(sigma).max() > 1e-3 * YOUNG  # the state is stressed, so the comparison means something
 
 

@@ -29,7 +29,7 @@ class Velocity(Boundary):
     body: str | None = None
 
     def bind(self, assembly: Assembly) -> "BoundVelocity":
-        return BoundVelocity(self, assembly)
+        return BoundVelocity(self, assembly, "Velocity")
 
 
 @functools.cache
@@ -49,10 +49,9 @@ def _make_impose(space: Space) -> Any:
 
 
 class BoundVelocity(Bound):
-    """Writes the value into the velocity."""
+    """Writes the value into the velocity; ``who`` is the condition that errors name."""
 
-    def __init__(self, condition: Velocity, assembly: Assembly):
-        who = type(condition).__name__
+    def __init__(self, condition: Velocity, assembly: Assembly, who: str):
         self.space, self.device = assembly.space, assembly.device
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
@@ -82,4 +81,4 @@ class Fixed(Boundary):
     body: str | None = None
 
     def bind(self, assembly: Assembly) -> "BoundVelocity":
-        return BoundVelocity(Velocity(self.region, 0.0, self.axes, self.body), assembly)
+        return BoundVelocity(Velocity(self.region, 0.0, self.axes, self.body), assembly, "Fixed")

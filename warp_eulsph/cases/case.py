@@ -22,7 +22,7 @@ from ..simulation import Body, Simulation
 from ..space import Space
 from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, choice, one_of
+from .options import Table, Zone, choice, made, one_of
 from .values import Formula, Number, PlaceFormula, Whole
 
 #: The shapes of ``geometry``: its functions.
@@ -48,6 +48,10 @@ class BodyTable(Table):
     velocity: PlaceFormula = Field(0.0, validate_default=True, description="initial velocity [m/s]")
     volume: PlaceFormula | None = Field(None, description="volumes [m^dim] instead of those of the shape")
     spacing: PlaceFormula | None = Field(None, description="spacings [m]; the dim-th root of the volume by default")
+    surface: PlaceFormula | None = Field(
+        None,
+        description="outward area vectors [m^(dim-1)] of the particles, 0 inside; as the shape has them by default",
+    )
     mirror: list[MirrorPlane] = Field([], description="planes behind which the body gets mirror ghosts")
 
     @property
@@ -59,18 +63,19 @@ class BodyTable(Table):
     def build(self, name: str) -> Body:
         """The body, without ghosts."""
         try:
-            x, volume, *surface = self.shape.make()
+            x, volume, *given = self.shape.make()
         except ValueError as error:
             raise ValueError(f"body.{name}.shape: {error}") from None
         except MemoryError:
             raise ValueError(f"body.{name}.shape: it does not fit into memory; increase the spacing") from None
+        surface = given[0] if given else None
         return Body(
             x=x,
             volume=volume if self.volume is None else self.volume.at(x)[:, 0],
             spacing=None if self.spacing is None else self.spacing.at(x)[:, 0],
             material=self.material.make(),
             velocity=self.velocity.at(x),
-            surface=surface[0] if surface else None,
+            surface=surface if self.surface is None else self.surface.at(x),
             name=name,
         )
 
@@ -83,6 +88,8 @@ class OutputTable(Table):
     at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
     fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
     precision: Precision = Field("single", description="of the stored numbers")
+    region: Zone | None = Field(None, description="particles in the snapshots, by initial positions; all by default")
+    body: str | None = Field(None, description="body whose particles are in the snapshots, any by default")
     log: choice(Schedule) = Field({"kind": "EverySteps", "count": 16}, validate_default=True)  # type: ignore[valid-type]
     checkpoint: Number = Field(600.0, gt=0.0, description="wall time between checkpoints [s]")
 
@@ -187,6 +194,8 @@ class Case(Table):
             snapshots=AnyOf(snapshots),
             fields=output.fields,
             dtype=np.float64 if output.precision == "double" else np.float32,
+            region=made(output.region, self.space, "region"),
+            body=output.body,
             log=output.log.make(),
             probes=probes,
             checkpoint=output.checkpoint,
@@ -219,7 +228,7 @@ class Case(Table):
                 wrong.append(f"{path}: must have {counts} components in {dim}-D, got {len(value.parts)}")
         named = [(f"boundary.{k}", table) for k, table in enumerate(self.boundary)]
         probes = [(f"probe.{k}", table) for k, table in enumerate(self.probe)]
-        for path, table in named + probes:
+        for path, table in [*named, *probes, ("output", self.output)]:
             of = getattr(table, "body", None)
             if of is not None and of not in self.body:
                 wrong.append(
@@ -238,6 +247,6 @@ class Case(Table):
     def _formulas(self) -> list[tuple[str, Formula]]:
         """Path and value of every formula of place."""
         tables: dict[str, Table] = {f"body.{name}": body for name, body in self.body.items()}
-        tables |= {f"boundary.{k}": condition for k, condition in enumerate(self.boundary)}
+        tables |= {f"boundary.{k}": condition for k, condition in enumerate(self.boundary)} | {"output": self.output}
         pairs = ((f"{path}.{name}", value) for path, table in tables.items() for name, value in table)
         return [(path, value) for path, value in pairs if isinstance(value, Formula)]

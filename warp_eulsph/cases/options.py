@@ -62,7 +62,7 @@ class Options(Table):
 
     def arguments(self, space: Any = None) -> dict[str, Any]:
         """The arguments as the class or function takes them."""
-        return {name: _made(value, space, name) for name, value in self if name != "kind"}
+        return {name: made(value, space, name) for name, value in self if name != "kind"}
 
     @model_validator(mode="after")
     def _check(self) -> "Options":
@@ -72,7 +72,8 @@ class Options(Table):
         return self
 
 
-def _made(value: Any, space: Any, name: str) -> Any:
+def made(value: Any, space: Any, name: str) -> Any:
+    """A value of a case file as the argument ``name`` takes it."""
     if isinstance(value, Options):
         return value.make(space)
     if isinstance(value, Formula):

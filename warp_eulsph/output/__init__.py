@@ -3,7 +3,7 @@
 from .checkpoint import DamagedError
 from .directory import BusyError, RunDirectory
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
-from .reader import Comparison, Run, RunFrame
+from .reader import Comparison, Run, RunFrame, points_on_line
 from .record import ChangedCaseError, Outcome, record
 from .recording import Recording
 from .recover import Findings, check, recover
@@ -34,6 +34,7 @@ __all__ = [
     "SnapshotWriter",
     "Stop",
     "check",
+    "points_on_line",
     "read_snapshot",
     "record",
     "recover",

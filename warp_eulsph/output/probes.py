@@ -1,6 +1,5 @@
 """Probes: figures of a run at a place, of a body, of a condition or across a plane, each to a table of its own."""
 
-import functools
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -14,9 +13,7 @@ from ..boundaries import Boundary
 from ..diagnostics import BodySums, SectionForce
 from ..schedule import EverySteps, Schedule
 from ..simulation import Simulation
-from ..space import Space
-from ..weights import Weight
-from ..weights.base import value
+from .shape_functions import shape_functions
 from .stress import body_stress, stresses
 
 #: Figures of the present state, by name; the same names and shapes every time.
@@ -173,35 +170,14 @@ def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
     raise ValueError(f"probe {probe.name!r}: body must be one of {sorted(simulation.ranges)}, got {name!r}")
 
 
-@functools.cache
-def _make_weigh(weight: Weight, space: Space) -> Any:
-    """Kernel: W(r, h) of each distance."""
-    real, W_of = space.real, value(weight, space)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def weigh(r: wp.array(dtype=real), h: wp.array(dtype=real), out: wp.array(dtype=real)):
-        i = wp.tid()
-        out[i] = W_of(r[i], h[i])
-
-    return weigh
-
-
 def _shape_functions(simulation: Simulation, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
-    space, weight, device = simulation.space, simulation.stepper.configuration.weight, simulation.device
-    h = np.broadcast_to(simulation.dilation * body.spacing, len(body.x))
-    away = body.x - X
-    r = np.linalg.norm(away, axis=1)
-    near = np.flatnonzero(r < weight.support * h)
-    distances, lengths = (wp.array(given[near], dtype=space.real, device=device) for given in (r, h))
-    W = wp.zeros(len(near), dtype=space.real, device=device)
-    wp.launch(_make_weigh(weight, space), len(near), [distances, lengths, W], device=device)
-    weights = np.asarray(W.numpy(), dtype=float) * np.broadcast_to(body.volume, len(body.x))[near]
-    basis = np.column_stack([np.ones(len(near)), away[near] / (h.max())])
-    moments = basis.T @ (weights[:, None] * basis)
-    if len(near) < 1 + space.dim or np.linalg.cond(moments) > 1e8:
+    n, weight = len(body.x), simulation.stepper.configuration.weight
+    h, volume = (np.broadcast_to(given, n) for given in (simulation.dilation * body.spacing, body.volume))
+    functions = shape_functions(X[None, :], body.x, volume, h, weight)
+    if not functions.inside[0]:
         raise ValueError(
-            f"probe {name!r}: X = {X.tolist()} m must lie in body {body.name!r}, {len(near)} of its particles are "
-            f"within reach; they lie in {body.x.min(axis=0)} to {body.x.max(axis=0)} m"
+            f"probe {name!r}: X = {X.tolist()} m must lie in body {body.name!r}, whose particles lie in "
+            f"{body.x.min(axis=0)} to {body.x.max(axis=0)} m"
         )
-    return near, weights * (basis @ np.linalg.inv(moments)[:, 0])
+    return functions.particle, functions.share

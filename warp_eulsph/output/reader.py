@@ -1,19 +1,24 @@
 """A run read back: ``Run("runs/column")[-1].F``."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from .. import weights
 from .directory import RunDirectory
 from .log import read_log
 from .manifest import Entry, Manifest
+from .shape_functions import shape_functions
 from .snapshot import read_field, read_units
 from .tables import read_table
+
+if TYPE_CHECKING:
+    import xarray
 
 #: Units of the fields that a frame derives from those it holds.
 DERIVED = {
@@ -23,6 +28,28 @@ DERIVED = {
     "green_lagrange": "-",
 }
 
+#: What ``RunFrame.interpolate`` needs of the snapshots besides the field itself.
+INTERPOLATION = ("volume", "smoothing_length", "body")
+# Points whose neighbours are in memory at once, some hundred each.
+_BLOCK = 20_000
+
+
+def points_on_line(start: Sequence[float], end: Sequence[float], count: int) -> np.ndarray:
+    """``count`` points from ``start`` to ``end`` [m], both among them, evenly spaced: (count, dim)."""
+    return np.linspace(np.asarray(start, dtype=float), np.asarray(end, dtype=float), count)
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """How the particles of a run see each other.
+
+    Attributes:
+        weight: SPH weight. box: lengths [m] of the periodic box, 0 where it is open; all open if empty.
+    """
+
+    weight: weights.Weight = weights.CubicSpline()
+    box: tuple[float, ...] = ()
+
 
 class RunFrame:
     """One snapshot; fields are read when they are asked for, and kept.
@@ -31,8 +58,8 @@ class RunFrame:
         path: of the file. time: [s]. step: steps taken before it. N: number of particles.
     """
 
-    def __init__(self, directory: Path, entry: Entry):
-        self.path = directory / entry.name
+    def __init__(self, directory: Path, entry: Entry, smoothing: Callable[[], Smoothing] = Smoothing):
+        self.path, self._smoothing = directory / entry.name, smoothing  # asked only when values at points are
         self.time, self.step, self.N = entry.time, entry.step, entry.particles
         self._fields: dict[str, np.ndarray] = {}
 
@@ -102,10 +129,60 @@ class RunFrame:
         F = self.F.astype(float)
         return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(F.shape[1]))
 
+    @property
+    def particles(self) -> np.ndarray:
+        """Numbers of the particles in the simulation, (N,): all, unless a region was recorded."""
+        return self["particle"] if "particle" in self.units else np.arange(self.N)
+
     @cached_property
     def units(self) -> dict[str, str]:
         """SI units of the fields in the file, by name."""
         return {"x": "m", **read_units(self.path)}
+
+    def field(self, name: str) -> np.ndarray:
+        """A field by its name, one of the file or one of those derived: (N, …).
+
+        Raises:
+            KeyError: the file has no such field, or not what it derives from.
+        """
+        return getattr(self, name) if name in DERIVED else self[name]
+
+    def interpolate(self, points: np.ndarray, name: str) -> np.ndarray:
+        """A field at points of space: corrected SPH sums, exact for fields that are linear in the present positions.
+
+        They extrapolate up to a smoothing length beyond the outermost particles, which the surface is within. Where
+        bodies touch, only the body with the nearest particle counts. The weight is the run's, or the cubic spline
+        where that is none of the package's.
+
+        Args:
+            points: [m], (m, dim), such as those of ``points_on_line``; in 1-D also (m,).
+            name: of a field, derived ones too.
+
+        Returns:
+            (m, …), not-a-number at points outside: no particle is nearer than its smoothing length, or those within
+            reach do not span the space, as where matter is drawn out to several times its length.
+
+        Raises:
+            ValueError: points of another shape or not finite, or snapshots without ``INTERPOLATION``.
+            KeyError: no such field.
+        """
+        missing = [need for need in INTERPOLATION if need not in self.units]
+        if missing:
+            raise ValueError(
+                f"{self.path} must hold {', '.join(INTERPOLATION)} for values at points, it lacks {missing}; write "
+                "snapshots with these fields"
+            )
+        places, dim = np.array(points, dtype=float), self.x.shape[1]
+        if places.ndim == 1 and dim == 1:
+            places = places[:, None]
+        if places.ndim != 2 or places.shape[1] != dim or not np.isfinite(places).all():
+            raise ValueError(f"points must be (m, {dim}) finite numbers [m], got shape {np.shape(points)}: {points}")
+        values, (volume, h, body) = self.field(name), (self[need] for need in INTERPOLATION)
+        by, found = self._smoothing(), []
+        for block in np.split(places, range(_BLOCK, len(places), _BLOCK)):
+            functions = shape_functions(block, self.x, volume, h, by.weight, body=body, box=by.box)
+            found.append(functions.apply(values))
+        return np.concatenate(found)
 
 
 @dataclass(frozen=True)
@@ -174,8 +251,13 @@ class Run(Sequence[RunFrame]):
 
     def __getitem__(self, index: int | slice) -> RunFrame | list[RunFrame]:
         if isinstance(index, slice):
-            return [RunFrame(self.directory.path, entry) for entry in self._entries[index]]
-        return RunFrame(self.directory.path, self._entries[index])
+            return [RunFrame(self.directory.path, entry, self._smoothing) for entry in self._entries[index]]
+        return RunFrame(self.directory.path, self._entries[index], self._smoothing)
+
+    def _smoothing(self) -> Smoothing:
+        simulation = self.description.get("simulation", {})
+        weight = getattr(weights, simulation.get("weight", ""), weights.CubicSpline)
+        return Smoothing(weight(), tuple(simulation.get("periodic", ())))
 
     def at(self, time: float) -> RunFrame:
         """The frame nearest to ``time`` [s]."""
@@ -240,11 +322,32 @@ class Run(Sequence[RunFrame]):
         state = self.status.get("state", "unknown")
         return "killed" if state == "running" and not self.directory.busy else state
 
+    def to_xarray(self, fields: Sequence[str] | None = None) -> "xarray.Dataset":
+        """All frames as a data set; values are read from the snapshots when they are looked at, and not kept.
+
+        Dimensions are ``time`` [s] and ``particle``, by its number in the simulation, for vectors ``axis`` and for
+        tensors ``axis_2`` too, both by their letters. Those of the stress, which has nine components in any dimension,
+        are ``stress_axis`` and ``stress_axis_2``. Principal values have a dimension of their own, least first. SI units
+        are the attribute ``units``.
+
+        Args:
+            fields: names, derived ones too; by default all that the snapshots hold.
+
+        Raises:
+            ModuleNotFoundError: xarray is not installed.
+            ValueError: unknown fields, no snapshots, or numbers of particles that change.
+        """
+        try:
+            from .labelled import dataset
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError("data sets need xarray: pip install 'warp_eulsph[xarray]'") from None
+        return dataset(self, fields)
+
     def compare(self, other: "Run", fields: Sequence[str] = ("x",)) -> Comparison:
         """Differences of the same particles in both runs, at the times that both have.
 
         Raises:
-            ValueError: no common times, or different numbers of particles.
+            ValueError: no common times, or different particles.
         """
         _, mine, theirs = np.intersect1d(self.times, other.times, return_indices=True)
         if not len(mine):
@@ -256,16 +359,12 @@ class Run(Sequence[RunFrame]):
         largest: dict[str, list[float]] = {name: [] for name in fields}
         for i, j in zip(mine.tolist(), theirs.tolist(), strict=True):
             first, second = self[i], other[j]
-            if first.N != second.N:
-                raise ValueError(f"the runs must have the same particles, got {first.N} and {second.N}")
+            if not np.array_equal(first.particles, second.particles):
+                raise ValueError(f"the runs must have the same particles, got {first.N} and {second.N}, or other ones")
             for name in fields:
-                a, b = (_field(frame, name).astype(float).reshape(first.N, -1) for frame in (first, second))
+                a, b = (frame.field(name).astype(float).reshape(first.N, -1) for frame in (first, second))
                 apart = np.linalg.norm(a - b, axis=1)
                 rms[name].append(float(np.sqrt(np.mean(apart**2))))
                 largest[name].append(float(apart.max()))
         as_arrays = [{name: np.array(values) for name, values in found.items()} for found in (rms, largest)]
         return Comparison(self.times[mine], *as_arrays)
-
-
-def _field(frame: RunFrame, name: str) -> np.ndarray:
-    return getattr(frame, name) if name in DERIVED else frame[name]

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
+import numpy as np
+
 from ..schedule import next_target
 from ..scheme.health import UnstableError
 from ..simulation import Simulation
@@ -19,7 +21,6 @@ from .log import append, cut, look
 from .probes import Measure
 from .recording import Recording
 from .series import SnapshotWriter
-from .snapshot import collect
 from .stopping import Stop
 from .tables import Table
 from .worker import Worker
@@ -85,7 +86,7 @@ def record(
         DamagedError: no checkpoint is whole.
         UnstableError: see ``Simulation.run``; the last checkpoint and snapshot stay.
         OSError: the disk refused; all that was written before is whole, and the run can be resumed.
-        ValueError: ``until`` is before the present time, or a probe looks at what is not there.
+        ValueError: ``until`` is before the present time, a probe looks at what is not there, or a wrong region.
     """
     home = RunDirectory(directory)
     with home.locked():
@@ -93,16 +94,21 @@ def record(
         present = simulation.t if checkpoint is None else checkpoint.time
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
-        measures = [probe.bind(simulation) for probe in recording.probes]  # wrong ones are told before files move
+        # What is wrong with probes and region is told before files move
+        measures = [probe.bind(simulation) for probe in recording.probes]
+        particles = recording.particles(simulation)
+        description = _description(simulation, recording, particles)
         if resume and checkpoint is None and home.holds_a_run:
             log.warning("%s has no checkpoint: the run starts anew, what is there moves to abandoned", home.path)
         if checkpoint is None:
             _begin(home, simulation, replace=replace or resume)
         else:
-            _go_on(home, simulation, recording, checkpoint, force=force)
-        kept = {"until": until, "case": dict(case or {}), **_description(simulation, recording)}
-        home.write(home.description, kept)
-        recorder = _Recorder(home, simulation, recording, measures, resume=checkpoint is not None)
+            _go_on(home, simulation, description, checkpoint, force=force)
+        home.write(home.description, {"until": until, "case": dict(case or {}), **description})
+        snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, particles=particles, resume=True)
+        recorder = _Recorder(
+            home, simulation, recording, measures, snapshots, description, resumed=checkpoint is not None
+        )
         return recorder.run(until, stop, watch)
 
 
@@ -115,10 +121,10 @@ def _begin(home: RunDirectory, simulation: Simulation, *, replace: bool) -> None
 
 
 def _go_on(
-    home: RunDirectory, simulation: Simulation, recording: Recording, checkpoint: Checkpoint, *, force: bool
+    home: RunDirectory, simulation: Simulation, description: Mapping[str, Any], checkpoint: Checkpoint, *, force: bool
 ) -> None:
     """Put the simulation where the run was, and set aside what the run has of later steps."""
-    _compare(checkpoint, simulation, recording, force)
+    _compare(checkpoint, simulation, description, force)
     simulation.restore(checkpoint.arrays, checkpoint.counters)
     home.rewind(checkpoint.step)
     cut(home.log, checkpoint.step)
@@ -127,15 +133,15 @@ def _go_on(
     log.info("resumed at step %d, t = %.8g s", checkpoint.step, checkpoint.time)
 
 
-def _description(simulation: Simulation, recording: Recording) -> dict[str, Any]:
-    kept = plain(recording)
+def _description(simulation: Simulation, recording: Recording, particles: np.ndarray | None) -> dict[str, Any]:
+    kept = {**plain(recording), "particles": plain(particles)}
     del kept["checkpoint"]  # wall time, which changes no step
     return {"simulation": describe(simulation), "recording": kept}
 
 
-def _compare(checkpoint: Checkpoint, simulation: Simulation, recording: Recording, force: bool) -> None:
+def _compare(checkpoint: Checkpoint, simulation: Simulation, description: Mapping[str, Any], force: bool) -> None:
     """Raise, or with ``force`` warn, when the case has changed; warn when the machine has."""
-    changes = differences(checkpoint.description, _description(simulation, recording))
+    changes = differences(checkpoint.description, description)
     if changes and not force:
         listed = "\n  ".join(changes)
         raise ChangedCaseError(
@@ -157,17 +163,19 @@ class _Recorder:
         simulation: Simulation,
         recording: Recording,
         measures: Sequence[Measure],
+        snapshots: SnapshotWriter,
+        description: dict[str, Any],
         *,
-        resume: bool,
+        resumed: bool,
     ):
-        self.home, self.simulation, self.recording, self.resumed = home, simulation, recording, resume
+        self.home, self.simulation, self.recording, self.resumed = home, simulation, recording, resumed
         self.schedule = recording.schedule
         tables = [Table(home.probes / probe.name, probe.units) for probe in recording.probes]
         self.probes = list(zip(recording.probes, measures, tables, strict=True))
-        self.snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, resume=True)
+        self.snapshots = snapshots
         self.snapshots.derive()
         self.checkpoints = Checkpoints(home.checkpoints)
-        self.description, self.environment = _description(simulation, recording), environment(simulation)
+        self.description, self.environment = description, environment(simulation)
         self.lines: list[dict[str, Any]] = []
         self.worker = Worker()
         self.flushed = self.checked = time.monotonic()
@@ -223,7 +231,7 @@ class _Recorder:
         simulation, recording = self.simulation, self.recording
         t, step, now = simulation.t, simulation.steps, time.monotonic()
         if everything or recording.snapshots.due(t, step):
-            frame = collect(simulation, self.snapshots.fields)
+            frame = self.snapshots.collect(simulation)
             self.worker.submit(lambda: self.snapshots.commit(frame))
         if everything or recording.log.due(t, step):
             self.lines.append(look(simulation))

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..boundaries import Assembly, Region
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
+from ..simulation import Simulation
 from .probes import Probe
 from .snapshot import checked_precision, chosen_fields
 
@@ -20,6 +22,9 @@ class Recording:
         snapshots: when a snapshot is written besides the start and the end.
         fields: names of ``FIELDS`` in them; all by default.
         dtype: ``np.float32`` or ``np.float64`` of their reals.
+        region: which particles are in them (see ``Region`` of the boundaries), by initial positions or numbers; all by
+            default. Their numbers are in the field ``particle``. Log, probes and checkpoints are of all particles.
+        body: name of the body whose particles are in them, any by default.
         log: when energies, momenta and extrema go to the log besides the start and the end. A GPU takes 8 steps
             between two looks at it, so that other numbers of steps cost time there.
         probes: what goes to tables of its own.
@@ -32,6 +37,8 @@ class Recording:
     snapshots: Schedule = AtTimes()
     fields: Iterable[str] | None = None
     dtype: Any = np.float32
+    region: Region | None = None
+    body: str | None = None
     log: Schedule = EverySteps(16)
     probes: Sequence[Probe] = ()
     checkpoint: float = 600.0
@@ -45,6 +52,18 @@ class Recording:
             raise ValueError(f"names of probes must differ, got {names}")
         if math.isnan(self.checkpoint) or self.checkpoint <= 0.0:
             raise ValueError(f"checkpoint must be a positive wall time [s], got {self.checkpoint}; 600 is 10 minutes")
+
+    def particles(self, simulation: Simulation) -> np.ndarray | None:
+        """Numbers of the particles that snapshots hold, (k,) int32; None if all.
+
+        Raises:
+            ValueError: unknown body, a region of wrong shape, or nothing selected.
+        """
+        if self.region is None and self.body is None:
+            return None
+        X = np.concatenate([body.x for body in simulation.bodies])
+        assembly = Assembly(simulation.space, simulation.device, X, simulation.particles, simulation.ranges)
+        return assembly.select(self.region, self.body, "Recording")
 
     @property
     def schedule(self) -> Schedule:

@@ -34,6 +34,7 @@ class SnapshotWriter:
         directory: of the run; made if absent.
         fields: names of ``snapshot.FIELDS``; all if None.
         dtype: ``np.float32`` or ``np.float64`` of the stored reals.
+        particles: numbers of those that snapshots hold, (k,), written as the field ``particle`` too; all if None.
         resume: go on after the snapshots that are there.
 
     Raises:
@@ -46,11 +47,14 @@ class SnapshotWriter:
         fields: Iterable[str] | None = None,
         *,
         dtype: Any = np.float32,
+        particles: np.ndarray | None = None,
         resume: bool = False,
     ):
         self.directory = Path(directory)
         self.fields, self.dtype = chosen_fields(fields), checked_precision(dtype)
-        self.manifest = Manifest(self.directory)
+        self.particles, self.manifest = particles, Manifest(self.directory)
+        if particles is not None and "particle" not in self.fields:
+            self.fields.append("particle")
         self._indexed = 0
         if not resume:
             RunDirectory(self.directory).abandon()
@@ -80,7 +84,11 @@ class SnapshotWriter:
         Raises:
             OSError: the disk refused; the files written before are whole.
         """
-        return self.commit(collect(simulation, self.fields))
+        return self.commit(self.collect(simulation))
+
+    def collect(self, simulation: Simulation) -> Frame:
+        """The present state, copied, for ``commit`` to write."""
+        return collect(simulation, self.fields, self.particles)
 
     def commit(self, frame: Frame) -> Path:
         """Write a frame collected before; the path of its file.

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..fields import PARTICLES, STATE
+from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
 from ..simulation import Simulation
 from .atomic import replace_file
 from .stress import cauchy_stress, padded
@@ -36,6 +37,8 @@ SOURCES: dict[str, Callable[[Simulation], np.ndarray]] = {
     "V0": lambda simulation: simulation.particles.V0.numpy().copy(),
     "body": lambda simulation: simulation.particles.body.numpy().copy(),
     "share": lambda simulation: simulation.particles.share.numpy().copy(),
+    "h": lambda simulation: simulation.particles.h.numpy().copy(),
+    "particle": lambda simulation: np.arange(len(simulation.particles.mass), dtype=np.int32),
 }
 
 #: Every field that a snapshot can hold. Stress has nine components in any dimension: σ33 of plane strain counts.
@@ -58,6 +61,15 @@ FIELDS = {
     ),
     "body": SnapshotField(lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, ("body",)),
     "share": SnapshotField(lambda d: (), PARTICLES["share"].unit, PARTICLES["share"].meaning, ("share",)),
+    "volume": SnapshotField(lambda d: (), PARTICLES["V0"].unit, "volume", ("V0", "J"), lambda V0, J: V0 * J),
+    "smoothing_length": SnapshotField(
+        lambda d: (),
+        "m",
+        "smoothing length of the present configuration",
+        ("x", "h", "J"),
+        lambda x, h, J: h * np.clip(J ** (1.0 / x.shape[1]), LEAST_GROWTH, LARGEST_GROWTH),
+    ),
+    "particle": SnapshotField(lambda d: (), "-", "number of the particle in the simulation", ("particle",)),
 }
 
 
@@ -119,11 +131,11 @@ class Frame:
         return {name: field.values(*(self.sources[source] for source in field.sources)) for name, field in fields}
 
 
-def collect(simulation: Simulation, names: Iterable[str]) -> Frame:
-    """What the fields of these ``names`` are made of in the present state, copied."""
-    names = tuple(names)
+def collect(simulation: Simulation, names: Iterable[str], particles: np.ndarray | None = None) -> Frame:
+    """What the fields of these ``names`` are made of in the present state, copied; of all ``particles`` if None."""
+    names, chosen = tuple(names), slice(None) if particles is None else particles
     needed = dict.fromkeys(["x", *(source for name in names for source in FIELDS[name].sources)])
-    sources = {name: SOURCES[name](simulation) for name in needed}
+    sources = {name: SOURCES[name](simulation)[chosen] for name in needed}
     return Frame(simulation.t, simulation.steps, simulation.space.dim, names, sources)
 
 

@@ -36,7 +36,7 @@ def quantity(frame: RunFrame, name: str) -> Quantity:
     field, _, component = name.partition(".")
     units = {**frame.units, **DERIVED}
     try:
-        values = np.asarray(getattr(frame, field) if field in DERIVED else frame[field], dtype=float)
+        values = np.asarray(frame.field(field), dtype=float)
     except KeyError:
         raise ValueError(
             f"a picture must be coloured by one of {[*frame.units, *DERIVED]}, derived ones only where the snapshots "
