@@ -33,7 +33,7 @@ class Balance:
     """Pair vectors of M4 and M5 from x̂ = x − ½(1 + λT)ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
 
     M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
-    it, whatever ψ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
+    it, whatever x̂ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
     which are the ones that pair particles up. Where e_a − s_a exceeds the particle's own face, the body has opened
     or closed: s_a becomes e_a, a free surface or none.
 
@@ -56,7 +56,6 @@ class Balance:
             raise ValueError(f"sweeps must be at least 1, got {self.sweeps}; correction=None balances nothing")
         if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
             raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.25 is the tested value")
-
         if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 2.0):
             raise ValueError(f"lean must be in [0, 2], got {self.lean}; 1 is the tested value")
 
