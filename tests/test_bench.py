@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.bench import command
+from warp_eulsph.bench import command, snapshot_cost
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
 from warp_eulsph.bench.phases import PHASES
@@ -99,3 +99,12 @@ def test_limits_of_the_machine_are_of_this_world(real):
         assert 1e9 < arithmetic(real) < 1e12
     finally:
         execution.set_threads(threads)
+
+
+def test_cost_of_snapshots_is_measured(capsys):
+    """A small block, one snapshot in the run; how long that takes is for a quiet machine to say."""
+    figures = snapshot_cost.main(["--side", "12", "--steps", "60", "--rounds", "1"])
+    assert set(figures) == {"step_ms", "stall_ms", "stall_percent", "cost_percent"}
+    assert figures["step_ms"] > 0.0
+    assert figures["stall_percent"] == pytest.approx(2.0 * figures["stall_ms"] / figures["step_ms"])
+    assert "1728 particles" in capsys.readouterr().out
