@@ -1,10 +1,12 @@
-"""How kernels run on the CPU: on how many threads, and whether by SIMD kernels or by the portable ones.
+"""How kernels run: on how many threads of the CPU, by SIMD kernels or the portable ones, launched or as graphs.
 
-Neither changes what is computed. Threads keep every bit: each particle gathers its own sums, so that it does not matter
-who computes it. SIMD kernels differ from the portable ones by round-off.
+None of it changes what is computed. Threads keep every bit: each particle gathers its own sums, so that it does not
+matter who computes it. Graphs keep every bit: they hold the same launches. SIMD kernels differ from the portable ones
+by round-off.
 
-The environment sets the defaults: ``WARP_EULSPH_THREADS`` (all cores the process may use) and ``WARP_EULSPH_SIMD``
-(1; 0 turns it off).
+The environment sets the defaults: ``WARP_EULSPH_THREADS`` (all cores the process may use), ``WARP_EULSPH_SIMD``
+(1; 0 turns it off) and ``WARP_EULSPH_GRAPHS`` (auto: on GPUs, and on the CPU where a launch is not worth several
+threads; 0 or 1).
 """
 
 import os
@@ -27,17 +29,20 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _from_environment() -> tuple[int, bool]:
+def _from_environment() -> tuple[int, bool, bool | None]:
     given = os.environ.get("WARP_EULSPH_THREADS", "")
     if given and not (given.isdigit() and int(given) > 0):
         raise ValueError(f"WARP_EULSPH_THREADS must be a number of threads, at least 1, got {given!r}")
     vectors = os.environ.get("WARP_EULSPH_SIMD", "1")
     if vectors not in ("0", "1"):
         raise ValueError(f"WARP_EULSPH_SIMD must be 0 or 1, got {vectors!r}")
-    return int(given) if given else _cores(), vectors == "1"
+    recorded = os.environ.get("WARP_EULSPH_GRAPHS", "auto")
+    if recorded not in ("auto", "0", "1"):
+        raise ValueError(f"WARP_EULSPH_GRAPHS must be auto, 0 or 1, got {recorded!r}")
+    return int(given) if given else _cores(), vectors == "1", {"auto": None, "0": False, "1": True}[recorded]
 
 
-_threads, _simd = _from_environment()
+_threads, _simd, _graphs = _from_environment()
 _pool: ThreadPoolExecutor | None = None
 
 
@@ -67,6 +72,24 @@ def simd(device: Any) -> bool:
     return _simd and wp.get_device(device).is_cpu
 
 
+def set_graphs(on: bool | None = None) -> None:
+    """Whether simulations made from now on take their steps as graphs; None where that is faster."""
+    global _graphs
+    _graphs = on
+
+
+def graphs(device: Any, n: int) -> bool:
+    """Whether steps of ``n`` particles on this device are to be recorded as graphs.
+
+    By default on GPUs whose driver knows conditional graphs, and on the CPU where launches are too short for threads: a
+    graph on the CPU runs on one.
+    """
+    if _graphs is not None:
+        return _graphs
+    on_cpu = wp.get_device(device).is_cpu
+    return n < 2 * LEAST_RANGE if on_cpu else wp.is_conditional_graph_supported()
+
+
 class Launcher:
     """Launches of one object on one device, recorded: a repeated one costs a fifth of ``wp.launch``.
 
@@ -84,7 +107,8 @@ class Launcher:
         The kernel's first parameter, which is not among ``arguments``, is the index that its thread 0 has. It must
         write to its own particle only.
         """
-        ranges = _ranges(n) if self.device.is_cpu else ((0, n),)
+        whole = not self.device.is_cpu or self.device.is_capturing  # a graph on the CPU runs on one thread
+        ranges = ((0, n),) if whole else _ranges(n)
         commands = self._commands(kernel, ranges, arguments, first)
         if len(ranges) == 1:
             commands[0].launch()

@@ -9,10 +9,12 @@ import warp as wp
 from .body import Body
 from .boundaries import Assembly, Boundary
 from .diagnostics import Diagnostics
+from .execution import graphs
 from .fields import allocate
 from .memory import check_memory
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.flux import Flux, check_reference
+from .scheme.graphs import StepGraphs, recordable
 from .scheme.health import UnstableError
 from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff
@@ -22,7 +24,7 @@ from .scheme.verlet import Verlet
 from .space import Space
 from .weights import CubicSpline, Weight
 
-# A GPU runs this many steps between two looks at its clock; a step past the target or past a failure changes nothing.
+# Steps by graphs between two looks at the clock; graphs past the target or past a failure do nothing.
 STEPS_BETWEEN_LOOKS = 8
 # A time step that fell below this share of the longest one means neighbourhoods that collapsed: the run would not end.
 STALLED = 1e-6
@@ -97,6 +99,8 @@ class Simulation:
             self.bodies[0].surface is not None,
         )
         self._check_neighbourhoods(X)
+        by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
+        self._graphs = StepGraphs(self.stepper) if by_graphs else None
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
         self._longest_dt = 0.0
@@ -140,9 +144,9 @@ class Simulation:
     def step(self, count: int = 1) -> None:
         """Take ``count`` steps of the scheme's own length, aiming at no time."""
         self.clock.aim(np.inf)
-        for _ in range(count):
-            self.stepper.step()
-        self._raise_if_bad()
+        end = self.steps + count
+        while self.steps < end:
+            self._take_steps(end - self.steps)
 
     def advance(self, until: float, most: int | None = None) -> None:
         """Take the steps between two looks at the clock towards ``until`` [s], at most ``most`` steps.
@@ -159,9 +163,10 @@ class Simulation:
             self._take_steps(None)
 
     def _take_steps(self, most: int | None) -> None:
-        batch = STEPS_BETWEEN_LOOKS if self.device.is_cuda else 1
-        for _ in range(batch if most is None else min(batch, most)):
+        if self._graphs is None:
             self.stepper.step()
+        else:
+            self._graphs.take(STEPS_BETWEEN_LOOKS if most is None else min(STEPS_BETWEEN_LOOKS, most))
         self._raise_if_bad()
 
     # what a checkpoint holds

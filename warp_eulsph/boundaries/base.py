@@ -92,9 +92,11 @@ class Bound:
 
     Attributes:
         indices: particles it acts on, (k,) int32.
+        recordable: whether ``impose`` and ``load`` launch kernels and nothing else, so that a graph can repeat them.
     """
 
     indices: np.ndarray
+    recordable: bool = False
 
     def start(self, state: Any) -> None:
         """Prepare from the initial state, surface vectors included; called once."""

@@ -57,6 +57,7 @@ class BoundBodyForce(Bound):
         self.space, self.device, self.mass = assembly.space, assembly.device, assembly.particles.mass
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
+        self.recordable = self.values.recordable
         self.X: wp.array | None = None
         if condition.material:
             self.X = wp.array(assembly.X.astype(self.space.numpy), dtype=self.space.vec, device=self.device)

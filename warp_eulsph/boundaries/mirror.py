@@ -154,6 +154,8 @@ def _make_reflect(space: Space, odd: bool) -> Any:
 class BoundMirrorGhosts(Bound):
     """Writes velocity, deformation gradient and position of the ghosts."""
 
+    recordable = True
+
     def __init__(self, condition: MirrorGhosts, assembly: Assembly):
         self.space, self.device, self.image = assembly.space, assembly.device, condition.image
         first = assembly.bodies[condition.body][0] if condition.body in assembly.bodies else 0

@@ -71,6 +71,7 @@ class BoundMotion(Bound):
         self.before, self.after = (
             Value(assembly, self.indices, self.space.dim, condition.displacement, who) for _ in range(2)
         )
+        self.recordable = self.before.recordable
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         before = self.before.at(self.X, clock, fraction - 0.5)

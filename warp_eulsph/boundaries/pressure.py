@@ -56,6 +56,7 @@ class BoundPressure(Bound):
         self.space, self.device = assembly.space, assembly.device
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, 1, condition.value, who)
+        self.recordable = self.values.recordable
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)

@@ -44,6 +44,8 @@ def _make_impose(space: Space) -> Any:
 class BoundRoller(Bound):
     """Removes the velocity along the normal."""
 
+    recordable = True
+
     def __init__(self, condition: Roller, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device

@@ -71,6 +71,7 @@ class BoundTraction(Bound):
         self.normal = unit_vector(condition.normal, self.space.dim, who)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
+        self.recordable = self.values.recordable
         self.areas = wp.zeros(len(self.indices), dtype=self.space.real, device=self.device)
 
     def start(self, state: Any) -> None:

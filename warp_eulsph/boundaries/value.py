@@ -56,6 +56,11 @@ class Value:
         elif not self.on_device:
             self._broadcast(given(assembly.X[indices], 0.0))  # a wrong function fails now, not in the first step
 
+    @property
+    def recordable(self) -> bool:
+        """Whether the rows need no Python function."""
+        return self.function is None or self.on_device
+
     def at(self, x: wp.array, clock: Any, fraction: float) -> wp.array:
         """The rows at positions ``x`` [m] and time t + fraction · Δt, (k,)."""
         if self.on_device:

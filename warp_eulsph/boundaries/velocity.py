@@ -55,6 +55,7 @@ class BoundVelocity(Bound):
         self.space, self.device = assembly.space, assembly.device
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
+        self.recordable = self.values.recordable
         axes = range(self.space.dim) if condition.axes is None else condition.axes
         if not set(axes) <= set(range(self.space.dim)) or len(list(axes)) == 0:
             raise ValueError(f"{who}: axes must be among {list(range(self.space.dim))}, got {condition.axes}")

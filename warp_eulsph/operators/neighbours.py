@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..atomics import raise_to
 from ..execution import Launcher, simd
 from ..fields import neighbour_structure
 from ..space import Space, difference
@@ -59,13 +60,13 @@ def _make_search(space: Space, fill: bool) -> Any:
         body: wp.array(dtype=wp.int32),
         box: vec,
         support: real,
-        h_max: real,
+        h_max: wp.array(dtype=real),
         count: wp.array(dtype=wp.int32),
         start: wp.array(dtype=wp.int32),
         index: wp.array(dtype=wp.int32),
     ):
         a = first_a + wp.tid()
-        reach = support * real(0.5) * (h[a] + h_max) * real(QUERY_MARGIN)
+        reach = support * real(0.5) * (h[a] + h_max[0]) * real(QUERY_MARGIN)
         n = int(0)
         row = int(0)
         if wp.static(fill):
@@ -108,6 +109,44 @@ def _make_search(space: Space, fill: bool) -> Any:
     return search
 
 
+@functools.cache
+def _make_longest(space: Space) -> Any:
+    """Kernel: the largest smoothing length."""
+    real = space.real
+    raise_longest = raise_to(real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_longest(first: int, h: wp.array(dtype=real), h_max: wp.array(dtype=real)):
+        raise_longest(h_max, h[first + wp.tid()])
+
+    return find_longest
+
+
+@functools.cache
+def _make_check_room(space: Space) -> Any:
+    """Kernel of one thread: stop a running batch of steps where the host must act before the lists can be filled."""
+    real, vec, dim = space.real, space.vec, space.dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def check_room(
+        total: wp.array(dtype=wp.int32),
+        capacity: int,
+        h_max: wp.array(dtype=real),
+        support: real,
+        box: vec,
+        running: wp.array(dtype=wp.int32),
+        waiting: wp.array(dtype=wp.int32),
+    ):
+        fits = total[0] <= capacity
+        for i in range(wp.static(dim if space.periodic else 0)):
+            fits = fits and (box[i] == real(0.0) or box[i] >= real(2.0) * support * h_max[0])
+        if running[0] != 0 and not fits:
+            running[0] = 0
+            waiting[0] = 1
+
+    return check_room
+
+
 class NeighbourLists:
     """Symmetric neighbour lists of one particle set, rebuilt in place; grows when a configuration needs more room.
 
@@ -138,6 +177,8 @@ class NeighbourLists:
         self.rows = neighbour_structure(space)()
         self.rows.box = self.box
         self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self._waiting = wp.zeros(1, dtype=wp.int32, device=device)
+        self._total, self._h_max = self.rows.start[n:], wp.zeros(1, dtype=space.real, device=device)
         self._builds = 0
         self._reserve(0)
 
@@ -149,17 +190,12 @@ class NeighbourLists:
     @property
     def pairs(self) -> int:
         """Directed pairs (a, b) in the lists; reads the device."""
-        return int(self.rows.start[-1:].numpy()[0])
+        return int(self._total.numpy()[0])
 
-    def _measure(self) -> None:
-        """Find the largest smoothing length of the moment; reads the device."""
-        self.h_max = float(self.h.numpy().max())
-        for i, length in enumerate(float(length) for length in self.box):
-            if 0.0 < length < 2.0 * self.support * self.h_max:
-                raise ValueError(
-                    f"periodic box length along axis {i} must be at least twice the support radius "
-                    f"({2 * self.support * self.h_max:.6g} m), got {length:.6g} m; enlarge the box or refine"
-                )
+    @property
+    def waiting(self) -> bool:
+        """Whether ``check_room`` stopped a batch of steps until ``make_room`` is called; reads the device."""
+        return bool(self._waiting.numpy()[0])
 
     def _reserve(self, pairs: int) -> None:
         self._launch.forget()
@@ -168,30 +204,73 @@ class NeighbourLists:
 
     def build(self, x: wp.array) -> None:
         """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.w`` is left to be computed."""
+        self.count_neighbours(x)
+        self.sum_counts()
+        self.make_room()
+        self.fill(x)
+
+    def count_neighbours(self, x: wp.array) -> None:
+        """The neighbours that each particle has in ``x``; launches only, as all parts of ``build`` but ``make_room``."""
+        n = len(x)
         if self.cells is None or self.space.periodic:
-            self._measure()
+            self._h_max.zero_()
+            self._launch(_make_longest(self.space), n, [self.h, self._h_max])
         last = 0 if self.cells is None else 3 - self.space.dim
-        self._launch(_make_pad(self.space, last), len(x), [x, self.box, self.padded])
-        if self.cells is None:
-            self.grid.build(self.padded, self.support * self.h_max * QUERY_MARGIN, groups=self.body)
-        else:
+        self._launch(_make_pad(self.space, last), n, [x, self.box, self.padded])
+        if self.cells is not None:
             self.cells.sort(self.padded)
-        scratch = self.rows.w
-        self._search(x, scratch, fill=False)
+        else:
+            if self._builds == 0:
+                self._measure()
+            self.grid.build(self.padded, self.support * self._longest * QUERY_MARGIN, groups=self.body)
+        self._scratch = self.rows.w
+        self._search(x, fill=False)
+
+    def sum_counts(self) -> None:
+        """Where each row begins; may be repeated."""
         wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
+
+    def check_room(self, running: wp.array) -> None:
+        """Stop a batch of steps (``running`` ← 0) when the lists have no room for the rows; launches only."""
+        arguments = [self._total, self.capacity, self._h_max, self.support, self.box, running, self._waiting]
+        self._launch.once(_make_check_room(self.space), 1, arguments)
+
+    def make_room(self) -> None:
+        """Grow the lists if the rows need it; reads the device.
+
+        Raises:
+            ValueError: a periodic box shorter than twice the support radius.
+        """
+        self._measure()
         pairs = self.pairs
         # Exactly what the first configuration needs, which may be the only one; from the second on a quarter more than
         # needed, so that a moving reference grows its lists seldom.
         if pairs > self.capacity or self._builds == 1:
             self._reserve(pairs + (pairs // 4 if self._builds else 0))
             log.debug("neighbour lists grew to %d pairs", self.capacity)
-        self._search(x, scratch, fill=True)
+        self._waiting.zero_()
         self._builds += 1
 
-    def _search(self, x: wp.array, scratch: wp.array, fill: bool) -> None:
-        if self.cells is not None:
-            self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, scratch, fill)
+    def fill(self, x: wp.array) -> None:
+        """Write the rows, for which there is room."""
+        self._search(x, fill=True)
+
+    def _measure(self) -> None:
+        """Note the largest smoothing length of the last count; reads the device."""
+        if self.cells is not None and not self.space.periodic:
             return
-        arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self.h_max]
+        self._longest = float(self._h_max.numpy()[0])  # cells of the next grid: any size is right, this one is fast
+        for i, length in enumerate(float(length) for length in self.box):
+            if 0.0 < length < 2.0 * self.support * self._longest:
+                raise ValueError(
+                    f"periodic box length along axis {i} must be at least twice the support radius "
+                    f"({2 * self.support * self._longest:.6g} m), got {length:.6g} m; enlarge the box or refine"
+                )
+
+    def _search(self, x: wp.array, fill: bool) -> None:
+        if self.cells is not None:
+            self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, self._scratch, fill)
+            return
+        arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self._h_max]
         arguments += [self.count, self.rows.start, self.rows.index]
         self._launch(_make_search(self.space, fill), len(x), arguments)

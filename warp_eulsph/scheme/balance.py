@@ -202,9 +202,11 @@ class BalancedPairs(UpwindForces):
         configuration.defect(state.surface, self.defect)
         self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface])
         for sweep in range(self.option.sweeps):
-            arguments = [reference, near, configuration.K, self.defect, self.psi, self._other]
+            old, new = self.psi, self._other
+            if (self.option.sweeps - sweep) % 2:  # as for the last sweep
+                old, new = new, old
+            arguments = [reference, near, configuration.K, self.defect, old, new]
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
-            self.psi, self._other = self._other, self.psi
         arguments = [self.particles, reference, self.psi, self.stress, self.option.bound, self.option.lean]
         self._launch(_make_shift(self.space), n, arguments)
         self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])

@@ -88,10 +88,9 @@ class LaxStepper(LaxWendroffStepper):
         super().__init__(options, *parts)
         self.dv = wp.zeros(self.n, dtype=self.space.vec, device=self.device)
 
-    def step(self) -> None:
-        """Advance U by one step."""
+    def advance(self) -> None:
+        """Advance U on the present reference."""
         U, other = self.U, self.half
-        self._refresh_if_due(U)  # k = 0, every few steps, or n
         self._choose_dt(U)
         self._gradients(U)  # M4: ∇_k v, ∇_k F
         self._sense(U)  # d of M9
@@ -107,7 +106,6 @@ class LaxStepper(LaxWendroffStepper):
         check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, other, self.grad_v, self.forces, self.dv)
         self.clock.tick()
-        self.steps += 1
 
     def _note_smoothing(self, U: Any, other: Any) -> None:
         wp.launch(_make_note(self.space), self.n, [U.v, other.v, self.dv], device=self.device)

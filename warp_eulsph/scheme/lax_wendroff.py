@@ -200,9 +200,15 @@ class LaxWendroffStepper:
         self.ledger.open(U)
 
     def step(self) -> None:
-        """Advance U by one step; a table of contents of M8."""
+        """Advance U by one step."""
+        if self.due(self.steps):  # k = 0, every few steps, or n
+            self.refresh()
+        self.advance()
+        self.steps += 1
+
+    def advance(self) -> None:
+        """Advance U on the present reference; a table of contents of M8."""
         U, half = self.U, self.half
-        self._refresh_if_due(U)  # k = 0, every few steps, or n
         self._choose_dt(U)
         self._gradients(U)  # M4: ∇_k v, ∇_k F
         self._sense(U)  # §5: d of vⁿ for both half steps, and the diffusion of Uⁿ
@@ -223,13 +229,27 @@ class LaxWendroffStepper:
         check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
-        self.steps += 1
 
-    def _refresh_if_due(self, U: Any) -> None:
-        if self.steps and self.policy.due(self.steps, self.configuration, U.F):
-            self._shift(U)  # M15
-            self.configuration.refresh(U)
-            self._after_refresh()
+    def due(self, step: int) -> bool:
+        """Whether the reference is to be refreshed before step number ``step``; the first finds it fresh."""
+        return step > 0 and self.policy.due(step, self.configuration, self.U.F)
+
+    def refresh(self) -> None:
+        """Make U the reference, shifted (M15)."""
+        self.move_reference()
+        self.configuration.lists.sum_counts()
+        self.configuration.lists.make_room()
+        self.renew_reference()
+
+    def move_reference(self) -> None:
+        """First part of a refresh, launches only: the reference becomes U, shifted (M15), and neighbours are counted."""
+        self._shift(self.U)
+        self.configuration.move(self.U)
+
+    def renew_reference(self) -> None:
+        """Last part of a refresh, launches only, when the lists have room: neighbours, weights, corrections, balance."""
+        self.configuration.renew()
+        self._after_refresh()
 
     def _shift(self, U: Any) -> None:
         if self.shifter is not None:

@@ -3,7 +3,7 @@
 import functools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
@@ -26,6 +26,8 @@ class ReferencePolicy(ABC):
 
     #: The initial configuration is the only reference there will be.
     fixed = False
+    #: ``due`` can tell from the number of the step alone, many steps ahead.
+    by_count = False
 
     @abstractmethod
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
@@ -37,6 +39,7 @@ class Never(ReferencePolicy):
     """Total Lagrangian: the initial configuration stays the reference."""
 
     fixed = True
+    by_count = True
 
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
         return False
@@ -47,6 +50,7 @@ class Every(ReferencePolicy):
     """Updated Lagrangian: refresh every ``steps`` steps."""
 
     steps: int
+    by_count: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.steps < 1:
@@ -61,6 +65,8 @@ class Every(ReferencePolicy):
 @dataclass(frozen=True)
 class Always(ReferencePolicy):
     """Eulerian: every step starts from its own configuration."""
+
+    by_count = True
 
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
         return True
@@ -185,10 +191,21 @@ class Configuration:
 
     def refresh(self, state: Any) -> None:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
-        n = len(state.x)
-        self._launch(_make_adopt(self.space), n, [state, self.particles, self.fields])
-        self.rebuild()
-        self._launch(make_correct(self.space), n, [self.K, self.fields, self.poor])
+        self.move(state)
+        self.lists.sum_counts()
+        self.lists.make_room()
+        self.renew()
+
+    def move(self, state: Any) -> None:
+        """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
+        self._launch(_make_adopt(self.space), len(state.x), [state, self.particles, self.fields])
+        self.lists.count_neighbours(self.fields.x)
+
+    def renew(self) -> None:
+        """Last part of a refresh, launches only: the neighbours, pair weights and corrections (M3)."""
+        self.lists.fill(self.fields.x)
+        self._weigh()
+        self._launch(make_correct(self.space), len(self.K), [self.K, self.fields, self.poor])
 
     def evolving(self) -> dict[str, wp.array]:
         """The reference's arrays by name: what a checkpoint must hold; ``rebuild`` derives the rest from them."""
@@ -197,6 +214,9 @@ class Configuration:
     def rebuild(self) -> None:
         """Neighbours, pair weights, K_a (M3) and interpolations of the positions, volumes and h in ``fields``."""
         self.lists.build(self.fields.x)
+        self._weigh()
+
+    def _weigh(self) -> None:
         pair_sums = (make_pair_sums_simd if self.simd else make_pair_sums)(self.weight, self.space)
         self._launch(pair_sums, len(self.K), [self.particles, self.fields, self.near, self.K])
         for interpolation in self._interpolations.values():

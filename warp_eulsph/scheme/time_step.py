@@ -73,8 +73,23 @@ def _make_tick(space: Space) -> Any:
                 clock.t[0] = wp.max(clock.target[0], clock.t[0])
             else:
                 clock.t[0] = clock.t[0] + clock.dt[0]
+        clock.taken[0] = clock.taken[0] + 1
+        if clock.bad[0] != WELL or clock.t[0] >= clock.target[0]:
+            clock.running[0] = 0
 
     return tick
+
+
+@functools.cache
+def _make_open(space: Space) -> Any:
+    Clock = clock_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def open_batch(clock: Clock):
+        clock.taken[0] = 0
+        clock.running[0] = int(clock.bad[0] == WELL and clock.t[0] < clock.target[0])
+
+    return open_batch
 
 
 class DeviceClock:
@@ -92,6 +107,7 @@ class DeviceClock:
             setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
         self.fields.rate = wp.zeros(1, dtype=space.real, device=device)
         self.fields.bad = wp.full(1, WELL, dtype=wp.int32, device=device)
+        self.fields.running, self.fields.taken = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
 
     def evolving(self) -> dict[str, wp.array]:
         """The clock's arrays by name: what a checkpoint must hold."""
@@ -115,6 +131,15 @@ class DeviceClock:
     def aim(self, target: float) -> None:
         """Set the time [s] that must be hit next."""
         self.fields.target.fill_(target)
+
+    def open_batch(self) -> None:
+        """Begin a batch of recorded steps, of which none is taken once the target is reached or a particle is bad."""
+        self._launch.once(_make_open(self.space), 1, [self.fields])
+
+    @property
+    def taken(self) -> int:
+        """Steps taken since the batch was begun; reads the device."""
+        return int(self.fields.taken.numpy()[0])
 
     def choose(self) -> None:
         """Δt for the step to come, from ``rate``."""

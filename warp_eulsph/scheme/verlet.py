@@ -63,10 +63,9 @@ def _make_mean(space: Space) -> Any:
 class VerletStepper(LaxWendroffStepper):
     """The scheme at work; all parts but the step itself are those of Lax-Wendroff."""
 
-    def step(self) -> None:
-        """Advance U by one step; a table of contents of M14."""
+    def advance(self) -> None:
+        """Advance U on the present reference; a table of contents of M14."""
         U, half = self.U, self.half
-        self._refresh_if_due(U)  # k = 0, every few steps, or n
         self._choose_dt(U)
         self._velocity_gradient(U)  # M4: ∇_k vⁿ
         self._sense(U)  # §5: d of vⁿ, and the diffusion of Uⁿ
@@ -87,7 +86,6 @@ class VerletStepper(LaxWendroffStepper):
         check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
-        self.steps += 1
 
     def _start_mean(self, U: Any, half: Any) -> None:
         wp.copy(half.v, U.v)
