@@ -59,7 +59,7 @@ def both(build, drive):
         execution.set_graphs(on)
         simulation = build()
         drive(simulation)
-        assert (simulation._graphs is not None) is on
+        assert simulation.by_graphs is on
         found.append(bits(simulation))
     assert found[0].keys() == found[1].keys()
     differing = [name for name in found[0] if not np.array_equal(found[0][name], found[1][name])]
@@ -125,13 +125,19 @@ class Resting(es.Boundary):
 
 
 @pytest.mark.parametrize(
-    "condition", [es.Velocity(lambda X: X[:, 0] < 0.2, lambda x, t: 0.0 * x + np.sin(t)), Resting()], ids=["host", "own"]
+    "condition",
+    [es.Velocity(lambda X: X[:, 0] < 0.2, lambda x, t: 0.0 * x + np.sin(t)), Resting()],
+    ids=["host", "own"],
 )
 def test_conditions_that_need_the_host_take_steps_by_the_host(condition):
     execution.set_graphs(True)
     simulation = block(2, es.Always(), boundaries=[condition])
-    assert simulation._graphs is None
+    assert not simulation.by_graphs
     simulation.step(3)
+    with pytest.raises(
+        ValueError, match="by_graphs must be False: a condition takes its values from a Python function"
+    ):
+        simulation.by_graphs = True
 
 
 @pytest.mark.parametrize("simd", [True, False])

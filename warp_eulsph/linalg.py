@@ -104,13 +104,14 @@ def symmetric_bounds(space: Space) -> Any:
 def symmetric_eigen(space: Space) -> Any:
     """``wp.func`` (A) -> (eigenvectors as columns, eigenvalues) by cyclic Jacobi rotations."""
     dim, real, mat, vec = space.dim, space.real, space.mat, space.vec
-    sweeps = 8  # Jacobi converges quadratically: 3×3 matrices reach round-off in 4 to 6 sweeps
+    sweeps = 8 if dim > 1 else 0  # Jacobi converges quadratically: 3×3 matrices reach round-off in 4 to 6 sweeps
 
     @wp.func
     def symmetric_eigen(A: mat):
         D = A
         R = wp.identity(n=wp.static(dim), dtype=real)
-        for _ in range(wp.static(sweeps if dim > 1 else 0)):
+        rounds = int(sweeps)  # not unrolled, which takes a second to compile
+        for _ in range(rounds):
             for p in range(wp.static(dim - 1)):
                 for q in range(p + 1, wp.static(dim)):
                     if D[p, q] != real(0.0):

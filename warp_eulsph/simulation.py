@@ -99,8 +99,8 @@ class Simulation:
             self.bodies[0].surface is not None,
         )
         self._check_neighbourhoods(X)
-        by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
-        self._graphs = StepGraphs(self.stepper) if by_graphs else None
+        self._graphs: StepGraphs | None = None
+        self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
         self._longest_dt = 0.0
@@ -212,6 +212,22 @@ class Simulation:
     def dt(self) -> float:
         """Last time step [s]."""
         return self.clock.dt
+
+    @property
+    def by_graphs(self) -> bool:
+        """Whether steps are taken as recorded graphs, not launched kernel by kernel; may be set at any time.
+
+        By default as ``execution.graphs`` says, unless a condition needs Python in every step.
+        """
+        return self._graphs is not None
+
+    @by_graphs.setter
+    def by_graphs(self, on: bool) -> None:
+        if on and not recordable(self.stepper):
+            raise ValueError(
+                "by_graphs must be False: a condition takes its values from a Python function; give it a wp.func"
+            )
+        self._graphs = StepGraphs(self.stepper) if on else None
 
     @property
     def steps(self) -> int:

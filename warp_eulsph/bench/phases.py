@@ -6,8 +6,10 @@ from typing import Any
 
 #: Parts of a step, and the methods that do them: attributes of the stepper, dots lead to its members.
 PHASES = {
-    "neighbour search": ["configuration.lists.build"],
-    "pair sums and correction (M3)": ["configuration.refresh"],
+    "neighbour search": [
+        f"configuration.lists.{part}" for part in ("count_neighbours", "sum_counts", "make_room", "fill")
+    ],
+    "pair sums and correction (M3)": ["configuration.move", "configuration.renew"],
     "balance (M13)": ["stabiliser.refresh"],
     "wave speeds and time step": ["_choose_dt"],
     "gradient (M4)": ["_velocity_gradient"],
