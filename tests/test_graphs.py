@@ -126,7 +126,7 @@ class Resting(es.Boundary):
 
 @pytest.mark.parametrize(
     "condition",
-    [es.Velocity(lambda X: X[:, 0] < 0.2, lambda x, t: 0.0 * x + np.sin(t)), Resting()],
+    [es.Velocity(lambda X: X[:, 0] < 0.2, lambda x, t: np.sin(t)), Resting()],
     ids=["host", "own"],
 )
 def test_conditions_that_need_the_host_take_steps_by_the_host(condition):
@@ -134,9 +134,7 @@ def test_conditions_that_need_the_host_take_steps_by_the_host(condition):
     simulation = block(2, es.Always(), boundaries=[condition])
     assert not simulation.by_graphs
     simulation.step(3)
-    with pytest.raises(
-        ValueError, match="by_graphs must be False: a condition takes its values from a Python function"
-    ):
+    with pytest.raises(ValueError, match="by_graphs must be False: a condition takes its values"):
         simulation.by_graphs = True
 
 

@@ -210,7 +210,7 @@ class NeighbourLists:
         self.fill(x)
 
     def count_neighbours(self, x: wp.array) -> None:
-        """The neighbours that each particle has in ``x``; launches only, as all parts of ``build`` but ``make_room``."""
+        """How many neighbours each particle has in ``x``; launches only, as is all of ``build`` but ``make_room``."""
         n = len(x)
         if self.cells is None or self.space.periodic:
             self._h_max.zero_()

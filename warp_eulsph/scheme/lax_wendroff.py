@@ -242,12 +242,12 @@ class LaxWendroffStepper:
         self.renew_reference()
 
     def move_reference(self) -> None:
-        """First part of a refresh, launches only: the reference becomes U, shifted (M15), and neighbours are counted."""
+        """First part of a refresh, launches only: the reference becomes U, shifted (M15); neighbours are counted."""
         self._shift(self.U)
         self.configuration.move(self.U)
 
     def renew_reference(self) -> None:
-        """Last part of a refresh, launches only, when the lists have room: neighbours, weights, corrections, balance."""
+        """Last part of a refresh, launches only, when the lists have room: neighbours, corrections, balance."""
         self.configuration.renew()
         self._after_refresh()
 

@@ -27,7 +27,7 @@ class ReferencePolicy(ABC):
     #: The initial configuration is the only reference there will be.
     fixed = False
     #: ``due`` can tell from the number of the step alone, many steps ahead.
-    by_count = False
+    by_count: ClassVar[bool] = False
 
     @abstractmethod
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
