@@ -1,8 +1,8 @@
 """What SIMD kernels share: packed rows, and the C++ that their loops over neighbours are made of.
 
-A SIMD kernel is a Warp kernel whose loop over neighbours is C++ with vectors of four reals (``wp.func_native`` and
-clang's vector types), for the CPU only. It reads what it needs of a neighbour from one *packed row*: a few vectors of
-four, aligned, so that a neighbour costs a few loads. Sums run in the order of the lists, in up to four parts.
+A SIMD kernel is a Warp kernel whose loop over neighbours is C++ with clang's vector types (``wp.func_native``), for the
+CPU only. A neighbour's vector fills a *row* of four lanes. Loops take eight neighbours k … k + 7 at a time, as four
+vectors of two rows, those of k + i and k + i + 4. Sums run in the order of the lists, in up to eight parts.
 """
 
 import functools
@@ -12,7 +12,7 @@ import warp as wp
 
 from .space import Space
 
-LANES = 4
+LANES = 4  # of a row
 ALIGNMENT = 64  # bytes, a cache line
 
 
@@ -24,83 +24,126 @@ def packed_rows(space: Space, n: int, vectors: int, device: Any) -> wp.array:
     return room[skip : skip + size].reshape((n, vectors * LANES))
 
 
+def _lanes(*of_row: int) -> str:
+    """Lanes of a shuffle that does the same in both rows; from 4 on, those of the second operand."""
+    return ", ".join(str(lane + (4 if lane >= 4 else 0) + 4 * row) for row in range(2) for lane in of_row)
+
+
+_SHUFFLES = f"""
+    auto both = [](Q low, Q high) __attribute__((always_inline)) {{
+        return (V)__builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+    }};
+    // one lane of each row in all lanes of that row
+    auto spread = [](V u, int lane) __attribute__((always_inline)) {{
+        switch (lane) {{
+            case 0: return (V)__builtin_shufflevector(u, u, {_lanes(0, 0, 0, 0)});
+            case 1: return (V)__builtin_shufflevector(u, u, {_lanes(1, 1, 1, 1)});
+            case 2: return (V)__builtin_shufflevector(u, u, {_lanes(2, 2, 2, 2)});
+            default: return (V)__builtin_shufflevector(u, u, {_lanes(3, 3, 3, 3)});
+        }}
+    }};
+    // from the rows of eight neighbours the first lanes of all eight, the second ones, ...
+    auto turn = [](const V* p, V* out) __attribute__((always_inline)) {{
+        const V a = __builtin_shufflevector(p[0], p[1], {_lanes(0, 4, 2, 6)});
+        const V b = __builtin_shufflevector(p[0], p[1], {_lanes(1, 5, 3, 7)});
+        const V c = __builtin_shufflevector(p[2], p[3], {_lanes(0, 4, 2, 6)});
+        const V d = __builtin_shufflevector(p[2], p[3], {_lanes(1, 5, 3, 7)});
+        out[0] = __builtin_shufflevector(a, c, {_lanes(0, 1, 4, 5)});
+        out[1] = __builtin_shufflevector(b, d, {_lanes(0, 1, 4, 5)});
+        out[2] = __builtin_shufflevector(a, c, {_lanes(2, 3, 6, 7)});
+        out[3] = __builtin_shufflevector(b, d, {_lanes(2, 3, 6, 7)});
+    }};
+    auto fold = [](V u) __attribute__((always_inline)) {{ return (Q)(u.lo + u.hi); }};
+    auto total = [](V u) __attribute__((always_inline)) {{
+        const Q q = u.lo + u.hi;
+        return (q[0] + q[1]) + (q[2] + q[3]);
+    }};
+"""
+
+
 @functools.cache
 def prelude(space: Space) -> str:
-    """C++ before a loop: the types T and V (vector of four), loads and stores of ``vec``, sums over lanes, images.
+    """C++ before a loop: the types T, Q (row of four) and V (two rows), what turns them about, nearest images.
 
     Expects ``box`` (vec) among the arguments of the function where space is periodic.
     """
-    real = "double" if space.real is wp.float64 else "float"
+    wide = space.real is wp.float64
+    masked = f"__builtin_ia32_loadup{'d256' if wide else 's128'}_mask"
     image = ""
     if space.periodic:
         image = f"""
         V image_box = 0, image_rate = 0;
         #pragma unroll
         for (int i = 0; i < {space.dim}; ++i) {{
-            image_box[i] = box.c[i];
-            image_rate[i] = box.c[i] > 0 ? 1 / box.c[i] : 0;
+            image_box[i] = image_box[i + 4] = box.c[i];
+            image_rate[i] = image_rate[i + 4] = box.c[i] > 0 ? 1 / box.c[i] : 0;
         }}
         """
     nearest = "d - image_box * __builtin_elementwise_rint(d * image_rate)" if space.periodic else "d"
     return f"""
     #pragma clang fp contract(fast)
-    typedef {real} T;
-    typedef {real} V __attribute__((ext_vector_type(4)));
+    typedef {"double" if wide else "float"} T;
+    typedef T Q __attribute__((ext_vector_type(4)));
+    typedef T V __attribute__((ext_vector_type(8)));
     constexpr int dim = {space.dim};
+    {_SHUFFLES}
     {image}
+    // dim reals, then zeros
     auto load = [](const T* p) __attribute__((always_inline)) {{
-        V v = 0;
+    #if defined(__AVX512VL__) && __has_builtin({masked})
+        typedef T M __attribute__((__vector_size__(4 * sizeof(T))));
+        return (Q){masked}((const M*)p, M{{}}, (1 << dim) - 1);
+    #else
+        Q q = 0;
         #pragma unroll
-        for (int i = 0; i < dim; ++i) v[i] = p[i];
-        return v;
+        for (int i = 0; i < dim; ++i) q[i] = p[i];
+        return q;
+    #endif
     }};
-    auto store = [](V v) __attribute__((always_inline)) {{
+    auto store = [](Q q) __attribute__((always_inline)) {{
         wp::vec_t<dim, T> out;
         #pragma unroll
-        for (int i = 0; i < dim; ++i) out.c[i] = v[i];
+        for (int i = 0; i < dim; ++i) out.c[i] = q[i];
         return out;
     }};
     auto nearest = [&](V d) __attribute__((always_inline)) {{ return {nearest}; }};
-    // the components of four vectors: x of all four, y of all four, ...
-    auto turn = [](const V* p, V* out) __attribute__((always_inline)) {{
-        V a = __builtin_shufflevector(p[0], p[1], 0, 4, 2, 6), b = __builtin_shufflevector(p[0], p[1], 1, 5, 3, 7);
-        V c = __builtin_shufflevector(p[2], p[3], 0, 4, 2, 6), d = __builtin_shufflevector(p[2], p[3], 1, 5, 3, 7);
-        out[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-        out[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-        out[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-        out[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
-    }};
-    // sums over the first dim lanes of each of four vectors
-    auto lane_sums = [&](const V* p) __attribute__((always_inline)) {{
-        V c[4];
-        turn(p, c);
-        V s = c[0];
-        #pragma unroll
-        for (int i = 1; i < dim; ++i) s += c[i];
-        return s;
-    }};
     """
 
 
-#: C++ that calls ``four(indices, weights)`` for the neighbours of ``a``, four at a time; where fewer are left, ``a``
-#: itself with weight zero makes up the number. Expects begin, end, index and w among the arguments.
-BY_FOUR = """
+#: C++ that calls ``eight(indices, weights)`` for the neighbours of ``a``; where fewer are left, ``a`` itself with weight
+#: zero makes up the number. Expects begin, end, index and w among the arguments.
+BY_EIGHT = """
     int k = begin;
-    for (; k + 4 <= end; k += 4) {
-        V four_w;
-        __builtin_memcpy(&four_w, w.data + k, sizeof(V));
-        four(index.data + k, four_w);
+    for (; k + 8 <= end; k += 8) {
+        V eight_w;
+        __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
+        eight(index.data + k, eight_w);
     }
     if (k < end) {
-        int some[4] = {a, a, a, a};
+        int some[8];
         V some_w = 0;
         #pragma unroll
-        for (int i = 0; i < 3; ++i) {
-            if (k + i < end) {
-                some[i] = index.data[k + i];
-                some_w[i] = w.data[k + i];
-            }
+        for (int i = 0; i < 8; ++i) {
+            some[i] = k + i < end ? index.data[k + i] : a;
+            if (k + i < end) some_w[i] = w.data[k + i];
         }
-        four(some, some_w);
+        eight(some, some_w);
+    }
+"""
+
+#: C++ that calls ``two(b, c, weights)`` for the neighbours of ``a``, two at a time; of an odd number the last one comes
+#: with ``a`` itself at weight zero. Expects begin, end, index and w among the arguments.
+BY_TWO = """
+    int k = begin;
+    for (; k + 8 <= end; k += 8) {
+        V eight_w;
+        __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
+        const int* const b = index.data + k;
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) two(b[i], b[i + 4], spread(eight_w, i), i);
+    }
+    for (; k < end; k += 2) {
+        const bool last = k + 1 == end;
+        two(index.data[k], last ? a : index.data[k + 1], both((Q)w.data[k], last ? (Q)0 : (Q)w.data[k + 1]), 0);
     }
 """

@@ -65,32 +65,33 @@ def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
     snippet = f"""
     {prelude(space)}
     auto slope = [](V q) __attribute__((always_inline)) {{ return {weight.slope_cpp}; }};
-    const V x_a = load(x.data[a].c);
+    const Q x_one = load(x.data[a].c);
+    const V x_a = both(x_one, x_one);
     const T h_a = h.data[a];
     V sums[dim * dim], row = 0, diagonal = 0;
     #pragma unroll
     for (int i = 0; i < dim * dim; ++i) sums[i] = 0;
-    auto four = [&](int k, int many) __attribute__((always_inline)) {{
-        V p[4], xi[4], h_ab = 0, V_b = 0, m_b = 0;
+    auto eight = [&](int k, const int* b, int many) __attribute__((always_inline)) {{
+        V p[4], xi[4], h_ab, V_b, m_b;
         #pragma unroll
-        for (int i = 0; i < 4; ++i) {{
-            const int b = i < many ? index.data[k + i] : a;
-            p[i] = nearest(load(x.data[b].c) - x_a);
-            h_ab[i] = T(0.5) * (h_a + h.data[b]);
-            V_b[i] = i < many ? volume.data[b] : 0;
-            m_b[i] = i < many ? mass.data[b] : 0;
+        for (int i = 0; i < 4; ++i) p[i] = nearest(both(load(x.data[b[i]].c), load(x.data[b[i + 4]].c)) - x_a);
+        #pragma unroll
+        for (int i = 0; i < 8; ++i) {{
+            h_ab[i] = h.data[b[i]];
+            V_b[i] = i < many ? volume.data[b[i]] : 0;
+            m_b[i] = i < many ? mass.data[b[i]] : 0;
         }}
         turn(p, xi);
-        V rr = 0;
+        V rr = xi[0] * xi[0];
         #pragma unroll
-        for (int i = 0; i < dim; ++i) rr += xi[i] * xi[i];
-        const V rate = 1 / h_ab, q = __builtin_elementwise_sqrt(rr) * rate;
+        for (int i = 1; i < dim; ++i) rr += xi[i] * xi[i];
+        const V rate = 2 / (h_ab + h_a), q = __builtin_elementwise_sqrt(rr) * rate;
         V g = slope(q) * T({sigma!r});
         #pragma unroll
         for (int i = 0; i < dim + 2; ++i) g *= rate;
         g = q < T({weight.support!r}) ? g : (V)0;
         const V w_ab = g * V_b;
-        if (many == 4) __builtin_memcpy(w.data + k, &w_ab, sizeof(V));
+        if (many == 8) __builtin_memcpy(w.data + k, &w_ab, sizeof(V));
         else for (int i = 0; i < many; ++i) w.data[k + i] = w_ab[i];
         #pragma unroll
         for (int i = 0; i < dim; ++i) for (int j = 0; j <= i; ++j) sums[i * dim + j] += xi[i] * xi[j] * w_ab;
@@ -98,14 +99,18 @@ def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
         diagonal += w_ab;
     }};
     int k = begin;
-    for (; k + 4 <= end; k += 4) four(k, 4);
-    if (k < end) four(k, end - k);
-    auto sum = [](V v) {{ return (v[0] + v[1]) + (v[2] + v[3]); }};
+    for (; k + 8 <= end; k += 8) eight(k, index.data + k, 8);
+    if (k < end) {{
+        int some[8];  // the particle itself makes up the number, with no volume
+        #pragma unroll
+        for (int i = 0; i < 8; ++i) some[i] = k + i < end ? index.data[k + i] : a;
+        eight(k, some, end - k);
+    }}
     #pragma unroll
     for (int i = 0; i < dim; ++i) for (int j = 0; j <= i; ++j)
-        K.data[a].data[i][j] = K.data[a].data[j][i] = sum(sums[i * dim + j]);
-    rows.data[a] = sum(row);
-    diagonals.data[a] = sum(diagonal);
+        K.data[a].data[i][j] = K.data[a].data[j][i] = total(sums[i * dim + j]);
+    rows.data[a] = total(row);
+    diagonals.data[a] = total(diagonal);
     """
 
     @wp.func_native(snippet)

@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from ..fields import neighbour_structure
-from ..simd import prelude
+from ..simd import BY_TWO, prelude
 from ..space import Space, difference
 
 
@@ -32,24 +32,22 @@ def laplacian_sum(space: Space, simd: bool) -> Any:
 
     snippet = f"""
     {prelude(Space(space.dim, space.real))}
-    V even = 0, odd = 0;
-    int k = begin;
-    for (; k + 1 < end; k += 2) {{
-        even += load(f.data[index.data[k]].c) * w.data[k];
-        odd += load(f.data[index.data[k + 1]].c) * w.data[k + 1];
-    }}
-    if (k < end) even += load(f.data[index.data[k]].c) * w.data[k];
-    return store(even + odd);
+    V sums[4] = {{0, 0, 0, 0}};
+    auto two = [&](int b, int c, V w, int part) __attribute__((always_inline)) {{
+        sums[part] += both(load(f.data[b].c), load(f.data[c].c)) * w;
+    }};
+    {BY_TWO}
+    return store(fold((sums[0] + sums[1]) + (sums[2] + sums[3])));
     """
 
     @wp.func_native(snippet)
     def weighted_sum(
-        begin: int, end: int, index: wp.array(dtype=int), w: wp.array(dtype=real), f: wp.array(dtype=vec)
+        a: int, begin: int, end: int, index: wp.array(dtype=wp.int32), w: wp.array(dtype=real), f: wp.array(dtype=vec)
     ) -> vec: ...
 
     @wp.func
     def laplacian_sum_simd(a: int, near: Neighbours, f: wp.array(dtype=vec), diagonal: wp.array(dtype=real)):
-        return weighted_sum(near.start[a], near.start[a + 1], near.index, near.w, f) - f[a] * diagonal[a]
+        return weighted_sum(a, near.start[a], near.start[a + 1], near.index, near.w, f) - f[a] * diagonal[a]
 
     return laplacian_sum_simd
 
@@ -81,20 +79,25 @@ def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
 
     snippet = f"""
     {prelude(space)}
-    const V f_a = load(f.data[a].c), x_a = load(x.data[a].c);
+    const Q f_one = load(f.data[a].c), x_one = load(x.data[a].c);
+    const V f_a = both(f_one, f_one), x_a = both(x_one, x_one);
     V sums[dim];
     #pragma unroll
     for (int i = 0; i < dim; ++i) sums[i] = 0;
-    for (int k = begin; k < end; ++k) {{
-        const int b = index.data[k];
-        const V df = {"nearest" if of_positions else ""}(load(f.data[b].c) - f_a);
-        const V dx = nearest(load(x.data[b].c) - x_a) * w.data[k];
+    auto two = [&](int b, int c, V w, int) __attribute__((always_inline)) {{
+        const V df = {"nearest" if of_positions else ""}(both(load(f.data[b].c), load(f.data[c].c)) - f_a);
+        const V dx = nearest(both(load(x.data[b].c), load(x.data[c].c)) - x_a) * w;
         #pragma unroll
-        for (int i = 0; i < dim; ++i) sums[i] += df[i] * dx;
-    }}
+        for (int i = 0; i < dim; ++i) sums[i] += spread(df, i) * dx;
+    }};
+    {BY_TWO}
     wp::mat_t<dim, dim, T> out;
     #pragma unroll
-    for (int i = 0; i < dim; ++i) for (int j = 0; j < dim; ++j) out.data[i][j] = sums[i][j];
+    for (int i = 0; i < dim; ++i) {{
+        const Q row = fold(sums[i]);
+        #pragma unroll
+        for (int j = 0; j < dim; ++j) out.data[i][j] = row[j];
+    }}
     return out;
     """
 
@@ -138,17 +141,26 @@ def flux_sum(space: Space, simd: bool) -> Any:
 
     snippet = f"""
     {prelude(space)}
-    const V x_a = load(x.data[a].c);
-    V Q_a[dim], sums[4] = {{0, 0, 0, 0}};
+    const Q x_one = load(x.data[a].c);
+    const V x_a = both(x_one, x_one);
+    V Q_a[dim], sums[dim];
     #pragma unroll
-    for (int i = 0; i < dim; ++i) Q_a[i] = load(Q.data[a].data[i]);
-    for (int k = begin; k < end; ++k) {{
-        const int b = index.data[k];
-        const V dx = nearest(load(x.data[b].c) - x_a) * w.data[k];
-        #pragma unroll
-        for (int i = 0; i < dim; ++i) sums[i] += (Q_a[i] + load(Q.data[b].data[i])) * dx;
+    for (int j = 0; j < dim; ++j) {{
+        const Q row = load(flux.data[a].data[j]);
+        Q_a[j] = both(row, row);
+        sums[j] = 0;
     }}
-    return store(lane_sums(sums));
+    auto two = [&](int b, int c, V w, int) __attribute__((always_inline)) {{
+        const V dx = nearest(both(load(x.data[b].c), load(x.data[c].c)) - x_a) * w;
+        #pragma unroll
+        for (int i = 0; i < dim; ++i)
+            sums[i] += (Q_a[i] + both(load(flux.data[b].data[i]), load(flux.data[c].data[i]))) * dx;
+    }};
+    {BY_TWO}
+    wp::vec_t<dim, T> out;
+    #pragma unroll
+    for (int j = 0; j < dim; ++j) out.c[j] = total(sums[j]);
+    return out;
     """
 
     @wp.func_native(snippet)
@@ -159,7 +171,7 @@ def flux_sum(space: Space, simd: bool) -> Any:
         index: wp.array(dtype=int),
         w: wp.array(dtype=real),
         box: vec,
-        Q: wp.array(dtype=mat),
+        flux: wp.array(dtype=mat),
         x: wp.array(dtype=vec),
     ) -> vec: ...
 

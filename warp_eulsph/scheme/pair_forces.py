@@ -7,7 +7,7 @@ import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
-from ..simd import BY_FOUR, packed_rows, prelude
+from ..simd import BY_EIGHT, packed_rows, prelude
 from ..space import Space
 from .reference import Configuration
 
@@ -54,56 +54,64 @@ def _make_forces(space: Space) -> Any:
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     # the difference of one coordinate of balanced positions, nearest image in a periodic box
-    balanced = "P[3]"
+    balanced = "spread(P, 3)"
     if space.periodic:
-        balanced = "P[3] - image_box[j] * __builtin_rint(P[3] * image_rate[j])"
+        balanced = "spread(P, 3) - image_box[j] * __builtin_elementwise_rint(spread(P, 3) * image_rate[j])"
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
-    const V* const all = (const V*)rows.data;
-    const V* const A = all + (size_t)a * vectors;
-    const V x_a = A[0], v_a = A[1];
-    V grad_a[dim], Pi_a[dim], internal = 0, dissipation = 0;
+    const Q* const all = (const Q*)rows.data;
+    const auto own = [&](int m, T sign) {{
+        Q q = all[(size_t)a * vectors + m];
+        q[3] *= sign;
+        return both(q, q);
+    }};
+    // impedances are added where the rest is subtracted
+    const V x_a = own(0, -1), v_a = own(1, -1);
+    V grad_a[dim], Pi_a[dim], internal = 0, dissipation[dim];
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
-        grad_a[j] = A[2 + j];
-        Pi_a[j] = A[2 + dim + j];
-        Pi_a[j][3] = -Pi_a[j][3];
+        grad_a[j] = own(2 + j, 1);
+        Pi_a[j] = own(2 + dim + j, -1);
+        dissipation[j] = 0;
     }}
-    auto four = [&](const int* b, V w) __attribute__((always_inline)) {{
-        V xi[4], jump[4], squares[4], along[4], Z, Z_shear;
+    auto eight = [&](const int* b, V w) __attribute__((always_inline)) {{
+        V xi[4], jump[4], X[4], J[4];
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
-            const V* const B = all + (size_t)b[i] * vectors;
-            xi[i] = nearest(B[0] - x_a);
-            Z[i] = B[0][3];
-            Z_shear[i] = B[1][3];
-            V mean = (grad_a[0] + B[2]) * xi[i][0];
+            const Q* const B = all + (size_t)b[i] * vectors;
+            const Q* const C = all + (size_t)b[i + 4] * vectors;
+            xi[i] = nearest(both(B[0], C[0]) - x_a);
+            V mean = (grad_a[0] + both(B[2], C[2])) * spread(xi[i], 0);
             #pragma unroll
-            for (int j = 1; j < dim; ++j) mean += (grad_a[j] + B[2 + j]) * xi[i][j];
-            jump[i] = B[1] - v_a - T(0.5) * mean;
-            squares[i] = xi[i] * xi[i];
-            along[i] = xi[i] * jump[i];
+            for (int j = 1; j < dim; ++j) mean += (grad_a[j] + both(B[2 + j], C[2 + j])) * spread(xi[i], j);
+            jump[i] = both(B[1], C[1]) - v_a - T(0.5) * mean;
             V force = 0;
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
-                const V P = Pi_a[j] + B[2 + dim + j];
+                const V P = Pi_a[j] + both(B[2 + dim + j], C[2 + dim + j]);
                 force += P * ({balanced});
             }}
-            internal += force * w[i];
+            internal += force * spread(w, i);
         }}
-        V rr = lane_sums(squares);
-        rr = rr > 0 ? rr : (V)1;
-        Z += x_a[3];
-        Z_shear += v_a[3];
-        const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon);
-        const V normal = lane_sums(along) * (Z - Z_shear) / rr * area, shear = Z_shear * area;
+        turn(xi, X);
+        turn(jump, J);
+        V rr = X[0] * X[0], along = X[0] * J[0];
         #pragma unroll
-        for (int i = 0; i < 4; ++i) dissipation += xi[i] * normal[i] + jump[i] * shear[i];
+        for (int j = 1; j < dim; ++j) {{
+            rr += X[j] * X[j];
+            along += X[j] * J[j];
+        }}
+        rr = rr > 0 ? rr : (V)1;
+        const V r = __builtin_elementwise_sqrt(rr), Z = X[3], Z_shear = J[3];
+        const V normal = along * (Z - Z_shear) * (w / r), shear = Z_shear * (w * r);
+        #pragma unroll
+        for (int j = 0; j < dim; ++j) dissipation[j] += X[j] * normal + J[j] * shear;
     }};
-    {BY_FOUR}
-    internals.data[a] = store(internal * V_a);
-    dissipations.data[a] = store(dissipation * V_a);
+    {BY_EIGHT}
+    internals.data[a] = store(fold(internal) * V_a);
+    #pragma unroll
+    for (int j = 0; j < dim; ++j) dissipations.data[a].c[j] = total(dissipation[j]) * (V_a * epsilon * T(0.25));
     """
 
     @wp.func_native(snippet)
