@@ -110,8 +110,8 @@ def prelude(space: Space) -> str:
     """
 
 
-#: C++ that calls ``eight(indices, weights)`` for the neighbours of ``a``; where fewer are left, ``a`` itself with weight
-#: zero makes up the number. Expects begin, end, index and w among the arguments.
+#: C++ that calls ``eight(indices, weights)`` for the neighbours of ``a``, eight at a time; where fewer are left, ``a``
+#: itself with weight zero makes up the number. Expects begin, end, index and w among the arguments.
 BY_EIGHT = """
     int k = begin;
     for (; k + 8 <= end; k += 8) {

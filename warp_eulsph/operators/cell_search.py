@@ -10,6 +10,8 @@ from ..space import Space
 
 # Cell coordinates are rounded, distances are tested exactly: a query a little too wide misses nothing.
 MARGIN = 1.001
+# Columns of cells that a particle reaches into, at most four along two axes; where there are more, in several goes.
+MOST_RUNS = 16
 
 _TYPES = """
     typedef T X __attribute__((ext_vector_type(8)));
@@ -36,11 +38,37 @@ _LOOK = """
     const T reach = T(0.5) * support * (h_a + frame.data[6]) * T(MARGIN);
     const int* side = sides.data;
     auto clamped = [](T x, int most) { x = x > 0 ? x : T(0); return x < T(most) ? (int)x : most; };
+    T per_cell[3];
+    for (int i = 0; i < 3; ++i) per_cell[i] = 1 / (rate[i] * rate[i]);
     // distance of x from slab c of axis i, squared; the outermost slabs have no end
     auto outside = [&](T x, int i, int c) {
         const T along = (x - frame.data[i]) * rate[i], below = T(c) - along, above = along - T(c + 1);
         const T out = c > 0 && below > 0 ? below : c < side[i] - 1 && above > 0 ? above : T(0);
-        return out * out / (rate[i] * rate[i]);
+        return out * out * per_cell[i];
+    };
+    // the candidates from j to last
+    auto look_at = [&](const T* p, int j, int last) __attribute__((always_inline)) {
+        for (; j < last; j += 8) {
+            X rr = 0, c;
+            for (int i = 3 - dim; i < 3; ++i) {
+                __builtin_memcpy(&c, column[i] + j, sizeof(X));
+                c -= p[i];
+                rr += c * c;
+            }
+            __builtin_memcpy(&c, column[3] + j, sizeof(X));
+            c = (c + h_a) * (T(0.5) * support);
+            auto hit = rr < c * c;
+            __builtin_memcpy(&c, column[4] + j, sizeof(X));
+            hit &= c == own;
+            I b;
+            __builtin_memcpy(&b, order.data + j, sizeof(I));
+            const B near = __builtin_convertvector(hit, B), other = __builtin_convertvector(b != a, B);
+            unsigned char near_bits, other_bits;
+            __builtin_memcpy(&near_bits, &near, 1);
+            __builtin_memcpy(&other_bits, &other, 1);
+            const unsigned char all = last - j >= 8 ? 255 : (1 << (last - j)) - 1;
+            found(b, near_bits & other_bits & all);
+        }
     };
     auto look = [&](const T* p) __attribute__((always_inline)) {
         int c0[3], c1[3];
@@ -48,40 +76,27 @@ _LOOK = """
             c0[i] = clamped((p[i] - reach - frame.data[i]) * rate[i], side[i] - 1);
             c1[i] = clamped((p[i] + reach - frame.data[i]) * rate[i], side[i] - 1);
         }
+        // first where the runs of candidates are, then the candidates: the one does not wait for the other
+        int from[MOST_RUNS], to[MOST_RUNS], runs = 0;
+        auto look_at_runs = [&]() __attribute__((always_inline)) {
+            for (int run = 0; run < runs; ++run) look_at(p, from[run], to[run]);
+            runs = 0;
+        };
         for (int x = c0[0]; x <= c1[0]; ++x) {
             const T dx = dim > 2 ? outside(p[0], 0, x) : T(0);
             for (int y = c0[1]; y <= c1[1]; ++y) {
-                const T dy = dim > 1 ? outside(p[1], 1, y) : T(0);
-                const T left = reach * reach - dx - dy;
-                if (left < 0) continue;
-                const T half = __builtin_sqrt(left);
+                const T left = reach * reach - dx - (dim > 1 ? outside(p[1], 1, y) : T(0));
+                const T half = __builtin_sqrt(left > 0 ? left : T(0));
                 const int first = (x * side[1] + y) * side[2];
                 const int z0 = clamped((p[2] - half - frame.data[2]) * rate[2], side[2] - 1);
                 const int z1 = clamped((p[2] + half - frame.data[2]) * rate[2], side[2] - 1);
-                const int last = begin.data[first + z1 + 1];
-                for (int j = begin.data[first + z0]; j < last; j += 8) {
-                    X rr = 0, c;
-                    for (int i = 3 - dim; i < 3; ++i) {
-                        __builtin_memcpy(&c, column[i] + j, sizeof(X));
-                        c -= p[i];
-                        rr += c * c;
-                    }
-                    __builtin_memcpy(&c, column[3] + j, sizeof(X));
-                    c = (c + h_a) * (T(0.5) * support);
-                    auto hit = rr < c * c;
-                    __builtin_memcpy(&c, column[4] + j, sizeof(X));
-                    hit &= c == own;
-                    const I lane = {0, 1, 2, 3, 4, 5, 6, 7};
-                    I b;
-                    __builtin_memcpy(&b, order.data + j, sizeof(I));
-                    const I wanted = __builtin_convertvector(hit, I) & (lane < last - j) & (b != a);
-                    const B chosen = __builtin_convertvector(wanted, B);
-                    unsigned char bits;
-                    __builtin_memcpy(&bits, &chosen, 1);
-                    found(b, bits);
-                }
+                from[runs] = begin.data[first + z0];
+                to[runs] = begin.data[first + z1 + 1];
+                runs += left >= 0;
+                if (runs == MOST_RUNS) look_at_runs();
             }
         }
+        look_at_runs();
     };
 """
 _OPEN = "look(place.data[a].c);"
@@ -135,20 +150,21 @@ _FILL = """
     if (size <= room && size + 8 <= stride) {
         __builtin_memcpy(some, scratch.data + (size_t)a * stride, size * sizeof(int));
     } else {
-        {search}
+        auto search_again = [&]() __attribute__((noinline)) { {search} };
+        search_again();
         if (size > room) return;
     }
     if (size == 0) return;
-    int low = some[0], high = some[0];
-    for (int i = 1; i < size; ++i) {
-        low = some[i] < low ? some[i] : low;
-        high = some[i] > high ? some[i] : high;
+    typedef short H __attribute__((ext_vector_type(16)));
+    constexpr int vectors = 5;  // ranked at a time
+    short key[room + 16 * vectors], rank[room + 16 * vectors];
+    int wide = 0;
+    for (int i = 0; i < size; ++i) {
+        const int away = some[i] - a;
+        key[i] = short(away);
+        wide |= (away + 32768) >> 16;
     }
-    if (high - low < 65536) {  // nearly always: then 16 bits tell them apart, and a vector holds 16
-        typedef short H __attribute__((ext_vector_type(16)));
-        constexpr int vectors = 5;  // ranked at a time
-        short key[room + 16 * vectors], rank[room + 16 * vectors];
-        for (int i = 0; i < size; ++i) key[i] = short(some[i] - low - 32768);
+    if (wide == 0) {  // nearly always: 16 bits tell them apart, and a vector holds 16
         for (int v = 0; v < size; v += 16 * vectors) {
             H x[vectors], r[vectors];
             __builtin_memcpy(x, key + v, sizeof(x));
@@ -178,7 +194,8 @@ def make_search(space: Space, fill: bool) -> Any:
     vec3 = wp.types.vector(length=3, dtype=real)
     search = _LOOK + (_PERIODIC if space.periodic else _OPEN)
     action = (_FILL if fill else _COUNT).replace("{search}", search)
-    snippet = prelude(Space(space.dim, space.real)) + f"constexpr T MARGIN = {MARGIN};" + _TYPES + action
+    constants = f"constexpr T MARGIN = {MARGIN};\nconstexpr int MOST_RUNS = {MOST_RUNS};\n"
+    snippet = prelude(Space(space.dim, space.real)) + constants + _TYPES + action
 
     @wp.func_native(snippet)
     def find(

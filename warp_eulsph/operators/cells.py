@@ -205,6 +205,7 @@ class Cells:
         self._launch = Launcher(device)
         self._scratch: Any = None
         self._room: Any = None
+        self._stride = 0
         self._most = CELLS_PER_PARTICLE * n + 64
         self._frame = wp.zeros(7, dtype=space.real, device=device)
         self._sides = wp.zeros(3, dtype=int, device=device)
@@ -234,15 +235,8 @@ class Cells:
             self._launch.forget()  # launches with arrays that the lists have outgrown
             size = len(scratch) * wp.types.type_size_in_bytes(self.space.real) // 4
             self._scratch, self._room = scratch, wp.array(ptr=scratch.ptr, shape=size, dtype=int, device=self.device)
+            # Rows inside a body are longer than the mean; rows that lie far apart would be slow to read
+            self._stride = min(size, len(scratch) * 5 // 4) // len(place)
         arguments = [place, self.h, self.body, self.box, self.support, self._frame, self._sides]
-        arguments += [
-            self._begin,
-            self._order,
-            self._columns,
-            count,
-            start,
-            index,
-            self._room,
-            len(self._room) // len(place),
-        ]
+        arguments += [self._begin, self._order, self._columns, count, start, index, self._room, self._stride]
         self._launch(make_search(self.space, fill), len(place), arguments)

@@ -37,8 +37,12 @@ def _make_check(space: Space) -> Any:
     @wp.kernel(module="unique", enable_backward=False)
     def check(first: int, state: State, clock: Clock):
         a = first + wp.tid()
-        finite = wp.isfinite(state.x[a]) and wp.isfinite(state.v[a]) and wp.isfinite(state.F[a])
-        if not finite or determinant(state.F[a]) <= real(0.0):
+        nothing = real(0.0)  # NaN as soon as a component is not finite
+        for i in range(wp.static(space.dim)):
+            nothing += state.x[a][i] * real(0.0) + state.v[a][i] * real(0.0)
+            for j in range(wp.static(space.dim)):
+                nothing += state.F[a][i, j] * real(0.0)
+        if nothing != real(0.0) or determinant(state.F[a]) <= real(0.0):
             lower_to(clock.bad, a)
 
     return check
