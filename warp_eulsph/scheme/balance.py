@@ -186,6 +186,8 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
+    balanced = True
+
     def __init__(self, option: Balance, space: Space, particles: Any, flux: Flux, device: Any):
         super().__init__(space, device)
         self.stress = flux.fields.Q  # of the last step when a refresh asks for it

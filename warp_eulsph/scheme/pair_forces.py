@@ -13,7 +13,7 @@ from .reference import Configuration
 
 
 def _vectors(space: Space) -> int:
-    """Vectors in a packed row: x with the impedance, v with the shear impedance, columns of ∇v, columns of Π with x̂."""
+    """Rows of four: x with the impedance, v with the shear impedance, columns of −½∇v, columns of Π with x̂."""
     return 2 + 2 * space.dim
 
 
@@ -42,21 +42,23 @@ def _make_pack(space: Space) -> Any:
             rows[a, 4 + i] = v_a[i]
             rows[a, first_Pi + 4 * i + 3] = balanced_a[i]
             for j in range(wp.static(dim)):
-                rows[a, first_grad + 4 * j + i] = grad_a[i, j]
+                rows[a, first_grad + 4 * j + i] = grad_a[i, j] * real(-0.5)
                 rows[a, first_Pi + 4 * j + i] = Pi_a[i, j]
 
     return pack
 
 
 @functools.cache
-def _make_forces(space: Space) -> Any:
-    """Kernel: M5 and M9 from packed rows."""
+def _make_forces(space: Space, balanced: bool) -> Any:
+    """Kernel: M5 and M9 from packed rows; without ``balanced`` positions M5 takes those that M9 has anyway."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    # the difference of one coordinate of balanced positions, nearest image in a periodic box
-    balanced = "spread(P, 3)"
-    if space.periodic:
-        balanced = "spread(P, 3) - image_box[j] * __builtin_elementwise_rint(spread(P, 3) * image_rate[j])"
+    # Coordinate j of the difference of the positions that M5 takes, in a periodic box its nearest image
+    xi_j = "spread(xi[i], j)"
+    if balanced:
+        xi_j = "spread(P, 3)"
+        if space.periodic:
+            xi_j = "spread(P, 3) - image_box[j] * __builtin_elementwise_rint(spread(P, 3) * image_rate[j])"
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
@@ -82,15 +84,14 @@ def _make_forces(space: Space) -> Any:
             const Q* const B = all + (size_t)b[i] * vectors;
             const Q* const C = all + (size_t)b[i + 4] * vectors;
             xi[i] = nearest(both(B[0], C[0]) - x_a);
-            V mean = (grad_a[0] + both(B[2], C[2])) * spread(xi[i], 0);
+            jump[i] = both(B[1], C[1]) - v_a;
             #pragma unroll
-            for (int j = 1; j < dim; ++j) mean += (grad_a[j] + both(B[2 + j], C[2 + j])) * spread(xi[i], j);
-            jump[i] = both(B[1], C[1]) - v_a - T(0.5) * mean;
+            for (int j = 0; j < dim; ++j) jump[i] += (grad_a[j] + both(B[2 + j], C[2 + j])) * spread(xi[i], j);
             V force = 0;
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
                 const V P = Pi_a[j] + both(B[2 + dim + j], C[2 + dim + j]);
-                force += P * ({balanced});
+                force += P * ({xi_j});
             }}
             internal += force * spread(w, i);
         }}
@@ -147,10 +148,10 @@ def _make_forces(space: Space) -> Any:
 
 
 class PairForces:
-    """The pass at work on n particles."""
+    """The pass at work on n particles; ``balanced`` when pair vectors are (M13)."""
 
-    def __init__(self, space: Space, n: int, device: Any):
-        self.space, self._launch = space, Launcher(device)
+    def __init__(self, space: Space, n: int, balanced: bool, device: Any):
+        self.space, self.balanced, self._launch = space, balanced, Launcher(device)
         self._rows = packed_rows(space, n, _vectors(space), device)
 
     def compute(
@@ -160,4 +161,4 @@ class PairForces:
         n = len(v)
         self._launch(_make_pack(self.space), n, [configuration.fields, flux, v, grad_v, self._rows])
         arguments = [configuration.fields, configuration.near, self._rows, epsilon]
-        self._launch(_make_forces(self.space), n, [*arguments, forces.internal, forces.dissipation])
+        self._launch(_make_forces(self.space, self.balanced), n, [*arguments, forces.internal, forces.dissipation])
