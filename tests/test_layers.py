@@ -16,7 +16,7 @@ LAYERS = [
     {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "diagnostics", "memory", "order", "output", "geometry"},
+    {"simulation", "rehearsal", "diagnostics", "memory", "order", "output", "geometry"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},
@@ -26,7 +26,7 @@ LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
 # What the command line prints is its result
-FRONT_ENDS = {f"bench/{name}.py" for name in ("command", "equal_error", "snapshot_cost")}
+FRONT_ENDS = {f"bench/{name}.py" for name in ("command", "equal_error", "mixing", "snapshot_cost")}
 FRONT_ENDS |= {"validation/command.py", "validation/step_cost.py"}
 FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 

@@ -47,8 +47,7 @@ class Result:
     bandwidth: float
     arithmetic: float
     phases: dict[str, float] = field(default_factory=dict)
-    cold_start_seconds: float | None = None
-    warm_start_seconds: float | None = None
+    start_up: dict[str, float] | None = None
 
 
 def bench(select: str = "", as_json: bool = False, start_up: bool = False) -> int:
@@ -64,7 +63,7 @@ def bench(select: str = "", as_json: bool = False, start_up: bool = False) -> in
         for case in chosen:
             results.append(run(case))
             if start_up:
-                results[-1].cold_start_seconds, results[-1].warm_start_seconds = start_up_seconds(case)
+                results[-1].start_up = start_up_seconds(case)
             if not as_json:
                 print(line(results[-1]), flush=True)
     finally:
@@ -127,23 +126,26 @@ def limits_of(dtype: str, threads: int) -> tuple[float, float]:
     return bandwidth(DTYPES[dtype]), arithmetic(DTYPES[dtype])
 
 
-def start_up_seconds(case: BenchCase) -> tuple[float, float]:
-    """Processor seconds of a fresh process that takes one small step of the case: kernels compiled, and cached."""
+def start_up_seconds(case: BenchCase) -> dict[str, float]:
+    """Seconds of a fresh process that takes one small step of the case, of the processor and on the clock.
+
+    ``cold`` compiles the kernels, ``warm`` takes them from the cache.
+    """
     code = (
         "import dataclasses, sys; from warp_eulsph.bench.cases import CASES\n"
         "case = next(case for case in CASES if case.name == sys.argv[1])\n"
         "dataclasses.replace(case, side=8).build().step()"
     )
-    seconds = []
+    seconds = {}
     with tempfile.TemporaryDirectory() as cache:
-        for _ in range(2):
+        for start in ("cold", "warm"):
             before = os.times()
             environment = {**os.environ, "WARP_CACHE_PATH": cache}
             subprocess.run([sys.executable, "-c", code, case.name], env=environment, check=True, capture_output=True)
             after = os.times()
             user, system = after.children_user - before.children_user, after.children_system - before.children_system
-            seconds.append(user + system)
-    return seconds[0], seconds[1]
+            seconds[f"{start}_cpu"], seconds[f"{start}_clock"] = user + system, after.elapsed - before.elapsed
+    return seconds
 
 
 def line(result: Result) -> str:
@@ -155,7 +157,9 @@ def line(result: Result) -> str:
         f"{100 * result.roof_fraction:.0f} % of the roof ({result.bandwidth / 1e9:.0f} GB/s, "
         f"{result.arithmetic / 1e9:.0f} Gflop/s), {result.bytes_per_particle:.0f} bytes per particle"
     )
-    if result.cold_start_seconds is not None:
-        text += f", start-up {result.cold_start_seconds:.1f} s cold, {result.warm_start_seconds:.1f} s warm"
+    if result.start_up is not None:
+        for start in ("cold", "warm"):
+            cpu, clock = result.start_up[f"{start}_cpu"], result.start_up[f"{start}_clock"]
+            text += f", {start} start {cpu:.1f} processor seconds, {clock:.1f} on the clock"
     phases = ", ".join(f"{phase} {spent:.0f}" for phase, spent in result.phases.items() if spent >= 1.0)
     return f"{text}\n    processor time per particle-step [ns]: {phases}"
