@@ -87,12 +87,13 @@ def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: 
         # perpendicular p a 2×2 matrix whose entries are bounded one by one, |p·b n| ≤ (b_max − b_min)/2.
         J = determinant(F)
         isochoric = wp.pow(J, real(-2.0) / real(3.0))
-        b = isochoric * (F @ wp.transpose(F))
-        trace = wp.trace(b) + isochoric * real(missing)
+        b = F @ wp.transpose(F)
+        trace = wp.trace(b) + real(missing)
         b_range = eigen_bounds(b)
-        along = c.mu * (real(5.0) / real(9.0) * trace - b_range[0] / real(3.0)) + c.kappa * volumetric_modulus(J)
-        across = c.mu * b_range[1]
-        mixed = c.mu / real(3.0) * (b_range[1] - b_range[0])
+        mu = c.mu * isochoric
+        along = mu * (real(5.0) / real(9.0) * trace - b_range[0] / real(3.0)) + c.kappa * volumetric_modulus(J)
+        across = mu * b_range[1]
+        mixed = mu / real(3.0) * (b_range[1] - b_range[0])
         return pair(coupled(along, mixed, across), across)
 
     return Law(Constants, stress, energy, wave_moduli)
