@@ -7,7 +7,8 @@ import warp as wp
 
 _SNIPPET = """
 #if defined(__CUDA_ARCH__)
-    wp::atomic_{name}(target.data, value);
+    // read first: most threads need no turn at the one address that all of them write to
+    if (value {better} *(volatile {type}*)target.data) wp::atomic_{name}(target.data, value);
 #else
     constexpr int relaxed = __ATOMIC_RELAXED;
     {type} old;

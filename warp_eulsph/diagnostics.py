@@ -113,7 +113,7 @@ class BodySums:
     def __init__(self, space: Space, particles: Any, body: range, device: Any):
         self.space, self.particles, self.body, self.device = space, particles, body, device
         self._each = wp.zeros(len(body), dtype=_Vec11, device=device)
-        self._total, self._sum = wp.zeros(1, dtype=_Vec11, device=device), Sum(_Vec11, device)
+        self._total, self._sum = wp.zeros(1, dtype=_Vec11, device=device), Sum(_Vec11, len(body), device)
 
     def __call__(self, state: Any) -> dict[str, np.ndarray]:
         """Of ``state``: centre of mass [m] and momentum [kg m/s], (dim,); angular momentum about the origin
@@ -141,7 +141,7 @@ class SectionForce:
         self.space, self.device = space, device
         self._indices = wp.array(indices, dtype=wp.int32, device=device)
         self._each, self._total = (wp.zeros(k, dtype=wp.vec3d, device=device) for k in (len(indices), 1))
-        self._sum = Sum(wp.vec3d, device)
+        self._sum = Sum(wp.vec3d, len(indices), device)
 
     def __call__(self, forces: Any) -> np.ndarray:
         """[N], (dim,), from the step's ``forces``: what acts between the particles themselves cancels in the sum."""
@@ -161,7 +161,7 @@ class Diagnostics:
         self._total = wp.zeros(1, dtype=_Vec6, device=device)
         self._jacobian = wp.zeros(n, dtype=space.real, device=device)
         self._extrema = wp.zeros(3, dtype=space.real, device=device)
-        self._sum = Sum(_Vec6, device)
+        self._sum = Sum(_Vec6, n, device)
 
     def momenta(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
         """Linear [kg m/s] and angular momentum about the origin [kg m²/s], both padded to (3,)."""

@@ -7,7 +7,8 @@ import warp as wp
 
 from .execution import Launcher
 
-BLOCKS = 256
+# One thread sums at least this many values, and there are at most this many threads: enough to keep a GPU busy.
+LEAST, MOST_BLOCKS = 64, 16384
 
 
 def _scalar(dtype: Any) -> Any:
@@ -17,44 +18,36 @@ def _scalar(dtype: Any) -> Any:
 
 @functools.cache
 def _make_partial(dtype: Any) -> Any:
+    """Kernel: Σ of each of ``blocks`` equal parts of ``n`` values."""
     zero = _scalar(dtype)(0)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def partial(values: wp.array(dtype=dtype), n: int, out: wp.array(dtype=dtype)):
-        block = wp.tid()
+    def partial(first: int, values: wp.array(dtype=dtype), n: int, blocks: int, out: wp.array(dtype=dtype)):
+        block = first + wp.tid()
         total = dtype(zero)
-        # 64-bit: block · n overflows 32 bits from 16 million values on
-        first = int(wp.int64(block) * wp.int64(n) // wp.int64(BLOCKS))
-        last = int(wp.int64(block + 1) * wp.int64(n) // wp.int64(BLOCKS))
-        for i in range(first, last):
+        # 64-bit: block · n overflows 32 bits
+        start = int(wp.int64(block) * wp.int64(n) // wp.int64(blocks))
+        end = int(wp.int64(block + 1) * wp.int64(n) // wp.int64(blocks))
+        for i in range(start, end):
             total += values[i]
         out[block] = total
 
     return partial
 
 
-@functools.cache
-def _make_final(dtype: Any) -> Any:
-    zero = _scalar(dtype)(0)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def final(partial: wp.array(dtype=dtype), out: wp.array(dtype=dtype)):
-        total = dtype(zero)
-        for block in range(BLOCKS):
-            total += partial[block]
-        out[0] = total
-
-    return final
-
-
 class Sum:
-    """Σ over (n,) values of one Warp type into a one-element array, without allocation after construction."""
+    """Σ over values of one Warp type, ``most`` at most, into a one-element array; allocates at construction only."""
 
-    def __init__(self, dtype: Any, device: Any):
-        self.partial = wp.zeros(BLOCKS, dtype=dtype, device=device)
+    def __init__(self, dtype: Any, most: int, device: Any):
         self.dtype, self._launch = dtype, Launcher(device)
+        blocks = min(most // LEAST, MOST_BLOCKS)
+        self._scratch = [wp.zeros(size, dtype=dtype, device=device) for size in (blocks, blocks // LEAST)]
 
     def __call__(self, values: wp.array, out: wp.array) -> None:
-        """``out[0]`` ← Σ values."""
-        self._launch.once(_make_partial(self.dtype), BLOCKS, [values, len(values), self.partial])
-        self._launch.once(_make_final(self.dtype), 1, [self.partial, out])
+        """``out[0]`` ← Σ values, in parts of parts."""
+        n, (into, then) = len(values), self._scratch
+        while n > LEAST:
+            blocks = min(n // LEAST, MOST_BLOCKS)
+            self._launch(_make_partial(self.dtype), blocks, [values, n, blocks, into])
+            values, n, into, then = into, blocks, then, into
+        self._launch(_make_partial(self.dtype), 1, [values, n, 1, out])

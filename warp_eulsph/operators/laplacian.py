@@ -141,7 +141,7 @@ class LaplacianSolver:
         self._p, self._Ap, self._z, self._product = vector(n), vector(n), vector(n), vector(n)
         self._diagonal = wp.zeros(n, dtype=space.real, device=device)
         self._scale, self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1), vector(1)
-        self._sum = Sum(space.vec, device)
+        self._sum = Sum(space.vec, n, device)
 
     def solve(self, reference: Any, near: Any, body: range, iterations: int) -> None:
         """Improve ``psi`` of one body's particles for the right-hand side in ``residual``, which becomes the residual.

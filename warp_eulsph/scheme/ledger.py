@@ -188,7 +188,7 @@ class Ledger:
         self._entries = wp.zeros(n, dtype=_Entry, device=device)
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy = wp.zeros(1, dtype=wp.float64, device=device)
-        self._sum_entries, self._sum = Sum(_Entry, device), Sum(wp.float64, device)
+        self._sum_entries, self._sum = Sum(_Entry, n, device), Sum(wp.float64, n, device)
         self.start = 0.0
 
     def open(self, U: Any) -> None:

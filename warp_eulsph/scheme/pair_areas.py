@@ -165,7 +165,10 @@ class ClosedPairs(Stabiliser):
         self.upwind = UpwindForces(space, device)
         self.solver = LaplacianSolver(space, len(particles.mass), device)
         self.admission = wp.zeros(len(particles.mass), dtype=space.real, device=device)
-        self._sum, self._total = Sum(space.vec, device), wp.zeros(1, dtype=space.vec, device=device)
+        self._sum, self._total = (
+            Sum(space.vec, len(particles.mass), device),
+            wp.zeros(1, dtype=space.vec, device=device),
+        )
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Solve for the potentials ψ of the new reference, body by body free of a mean (M11)."""

@@ -111,7 +111,7 @@ class Projection:
         self.space, self.particles, self.bodies, self.device = space, particles, bodies, device
         self.couples = wp.zeros(n, dtype=wp.vec3d, device=device)
         self._each = wp.zeros(n, dtype=_Sums, device=device)
-        self._total, self._sum = wp.zeros(1, dtype=_Sums, device=device), Sum(_Sums, device)
+        self._total, self._sum = wp.zeros(1, dtype=_Sums, device=device), Sum(_Sums, n, device)
 
     def __call__(self, x: wp.array, forces: wp.array) -> None:
         """Change ``forces`` [N] at positions ``x`` [m], both (n,) of vec, in place."""
