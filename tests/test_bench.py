@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.bench import command, snapshot_cost
+from warp_eulsph.bench import command, mixing, snapshot_cost
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
 from warp_eulsph.bench.phases import PHASES
@@ -108,3 +108,13 @@ def test_cost_of_snapshots_is_measured(capsys):
     assert figures["step_ms"] > 0.0
     assert figures["stall_percent"] == pytest.approx(2.0 * figures["stall_ms"] / figures["step_ms"])
     assert "1728 particles" in capsys.readouterr().out
+
+
+def test_cost_of_mixing_is_measured(capsys):
+    """A small cube, stirred for a moment: it fits the caches, where the order of particles costs nothing."""
+    threads = execution.threads()
+    rates = mixing.main(["--side", "8", "--steps", "20"])
+    assert execution.threads() == threads
+    assert set(rates) == {"lattice", "mixed", "sorted"}
+    assert all(1e4 < rate < 1e8 for rate in rates.values())
+    assert "M particle-steps per processor second" in capsys.readouterr().out

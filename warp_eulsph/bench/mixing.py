@@ -46,6 +46,19 @@ def stirred_cube(x: np.ndarray, side: int) -> Simulation:
     return Simulation(body, boundaries=[Velocity(None, stirred)], time_step=fixed)
 
 
+def compare(side: int, steps: int) -> dict[str, float]:
+    """Rates of the lattice, of the cube after ``steps`` steps, and of that cube sorted."""
+    simulation = stirred_cube(box((0.0,) * 3, (1.0,) * 3, 1.0 / side)[0], side)
+    simulation.step(3)
+    rates = {"lattice": rate(simulation)}
+    simulation.step(steps)
+    rates["mixed"] = rate(simulation)
+    x = simulation.x
+    again = stirred_cube(x[spatial_order(x, 1.0 / side)], side)
+    again.step(3)
+    return rates | {"sorted": rate(again)}
+
+
 def rate(simulation: Simulation) -> float:
     """Particle-steps per processor second, median over rounds."""
     seconds = []
@@ -63,16 +76,12 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("--steps", type=int, default=2000)
     args = parser.parse_args(argv)
     wp.config.log_level = wp.LOG_WARNING
+    threads = execution.threads()
     execution.set_threads(1)
-    simulation = stirred_cube(box((0.0,) * 3, (1.0,) * 3, 1.0 / args.side)[0], args.side)
-    simulation.step(3)
-    rates = {"lattice": rate(simulation)}
-    simulation.step(args.steps)
-    rates["mixed"] = rate(simulation)
-    x = simulation.x
-    again = stirred_cube(x[spatial_order(x, 1.0 / args.side)], args.side)
-    again.step(3)
-    rates["sorted"] = rate(again)
+    try:
+        rates = compare(args.side, args.steps)
+    finally:
+        execution.set_threads(threads)
     for name, value in rates.items():
         print(f"{name:8s} {value / 1e6:.3f} M particle-steps per processor second")
     return rates
