@@ -186,8 +186,6 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    balanced = True
-
     def __init__(self, option: Balance, space: Space, particles: Any, flux: Flux, device: Any):
         super().__init__(space, device)
         self.stress = flux.fields.Q  # of the last step when a refresh asks for it
@@ -205,7 +203,7 @@ class BalancedPairs(UpwindForces):
         self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface])
         for sweep in range(self.option.sweeps):
             old, new = self.psi, self._other
-            if (self.option.sweeps - sweep) % 2:  # as for the last sweep
+            if (self.option.sweeps - sweep) % 2:  # the last sweep writes ψ, the others take turns
                 old, new = new, old
             arguments = [reference, near, configuration.K, self.defect, old, new]
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)

@@ -2,7 +2,7 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import warp as wp
 
@@ -115,9 +115,6 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
 class UpwindForces(Stabiliser):
     """M9 alone, for references that need no correction."""
 
-    #: Pair vectors are taken from balanced positions (M13).
-    balanced: ClassVar[bool] = False
-
     def __init__(self, space: Space, device: Any):
         self.space, self.device, self._launch = space, device, Launcher(device)
         self._in_one_pass: PairForces | None = None
@@ -138,7 +135,7 @@ class UpwindForces(Stabiliser):
         """Internal force (M5) and dissipation (M9) into ``forces``."""
         if configuration.simd and sensor is None:
             if self._in_one_pass is None:
-                self._in_one_pass = PairForces(self.space, len(v), self.balanced, self.device)
+                self._in_one_pass = PairForces(self.space, len(v), self.device)
             self._in_one_pass.compute(configuration, flux, v, grad_v, epsilon, forces)
             return
         configuration.divergence(flux.Pi, forces.internal)

@@ -49,16 +49,14 @@ def _make_pack(space: Space) -> Any:
 
 
 @functools.cache
-def _make_forces(space: Space, balanced: bool) -> Any:
-    """Kernel: M5 and M9 from packed rows; without ``balanced`` positions M5 takes those that M9 has anyway."""
+def _make_forces(space: Space) -> Any:
+    """Kernel: M5 and M9 from packed rows."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    # Coordinate j of the difference of the positions that M5 takes, in a periodic box its nearest image
-    xi_j = "spread(xi[i], j)"
-    if balanced:
-        xi_j = "spread(P, 3)"
-        if space.periodic:
-            xi_j = "spread(P, 3) - image_box[j] * __builtin_elementwise_rint(spread(P, 3) * image_rate[j])"
+    # the difference of one coordinate of balanced positions, nearest image in a periodic box
+    balanced = "spread(P, 3)"
+    if space.periodic:
+        balanced = "spread(P, 3) - image_box[j] * __builtin_elementwise_rint(spread(P, 3) * image_rate[j])"
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
@@ -87,13 +85,6 @@ def _make_forces(space: Space, balanced: bool) -> Any:
             jump[i] = both(B[1], C[1]) - v_a;
             #pragma unroll
             for (int j = 0; j < dim; ++j) jump[i] += (grad_a[j] + both(B[2 + j], C[2 + j])) * spread(xi[i], j);
-            V force = 0;
-            #pragma unroll
-            for (int j = 0; j < dim; ++j) {{
-                const V P = Pi_a[j] + both(B[2 + dim + j], C[2 + dim + j]);
-                force += P * ({xi_j});
-            }}
-            internal += force * spread(w, i);
         }}
         turn(xi, X);
         turn(jump, J);
@@ -108,6 +99,19 @@ def _make_forces(space: Space, balanced: bool) -> Any:
         const V normal = along * (Z - Z_shear) * (w / r), shear = Z_shear * (w * r);
         #pragma unroll
         for (int j = 0; j < dim; ++j) dissipation[j] += X[j] * normal + J[j] * shear;
+        // last, so that few vectors are alive at a time: spilled to a stack that is not aligned to them they cost a third
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) {{
+            const Q* const B = all + (size_t)b[i] * vectors;
+            const Q* const C = all + (size_t)b[i + 4] * vectors;
+            V force = 0;
+            #pragma unroll
+            for (int j = 0; j < dim; ++j) {{
+                const V P = Pi_a[j] + both(B[2 + dim + j], C[2 + dim + j]);
+                force += P * ({balanced});
+            }}
+            internal += force * spread(w, i);
+        }}
     }};
     {BY_EIGHT}
     internals.data[a] = store(fold(internal) * V_a);
@@ -148,10 +152,10 @@ def _make_forces(space: Space, balanced: bool) -> Any:
 
 
 class PairForces:
-    """The pass at work on n particles; ``balanced`` when pair vectors are (M13)."""
+    """The pass at work on n particles."""
 
-    def __init__(self, space: Space, n: int, balanced: bool, device: Any):
-        self.space, self.balanced, self._launch = space, balanced, Launcher(device)
+    def __init__(self, space: Space, n: int, device: Any):
+        self.space, self._launch = space, Launcher(device)
         self._rows = packed_rows(space, n, _vectors(space), device)
 
     def compute(
@@ -161,4 +165,4 @@ class PairForces:
         n = len(v)
         self._launch(_make_pack(self.space), n, [configuration.fields, flux, v, grad_v, self._rows])
         arguments = [configuration.fields, configuration.near, self._rows, epsilon]
-        self._launch(_make_forces(self.space, self.balanced), n, [*arguments, forces.internal, forces.dissipation])
+        self._launch(_make_forces(self.space), n, [*arguments, forces.internal, forces.dissipation])
