@@ -99,7 +99,7 @@ def _make_forces(space: Space) -> Any:
         const V normal = along * (Z - Z_shear) * (w / r), shear = Z_shear * (w * r);
         #pragma unroll
         for (int j = 0; j < dim; ++j) dissipation[j] += X[j] * normal + J[j] * shear;
-        // last, so that few vectors are alive at a time: spilled to a stack that is not aligned to them they cost a third
+        // apart, so that few vectors are alive at a time: the stack is not aligned to them, spills cost up to a half
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
             const Q* const B = all + (size_t)b[i] * vectors;
