@@ -112,9 +112,10 @@ def neighbour_structure(space: Space) -> Any:
 def clock_structure(space: Space) -> Any:
     """Time on the device, so that a recorded step stays valid: arrays of one element.
 
-    ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``target`` [s] time that
-    must be hit, ``rate`` [1/s] largest wave speed over spacing, ``bad`` index of the first unphysical particle; of a
-    batch of recorded steps ``running``, 0 when the rest is not to be taken, and ``taken``, steps so far.
+    ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``longest_dt`` [s] the
+    longest of these, ``target`` [s] time that must be hit, ``rate`` [1/s] largest wave speed over spacing, ``bad``
+    index of the first unphysical particle; of a batch of recorded steps ``running``, 0 when the rest is not to be
+    taken, and ``taken``, steps so far.
     """
 
     @wp.struct
@@ -122,6 +123,7 @@ def clock_structure(space: Space) -> Any:
         t: wp.array(dtype=wp.float64)
         dt: wp.array(dtype=wp.float64)
         free_dt: wp.array(dtype=wp.float64)
+        longest_dt: wp.array(dtype=wp.float64)
         target: wp.array(dtype=wp.float64)
         rate: wp.array(dtype=space.real)
         bad: wp.array(dtype=wp.int32)

@@ -115,7 +115,6 @@ class Simulation:
         self.by_graphs = by_graphs and recordable(self.stepper)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
-        self._longest_dt = 0.0
 
     # what a run does
 
@@ -190,7 +189,7 @@ class Simulation:
     @property
     def counters(self) -> dict[str, float]:
         """The numbers beside the arrays that evolve: steps taken, starting energy [J], longest step so far [s]."""
-        return {"steps": self.steps, "start": self.stepper.ledger.start, "longest_dt": self._longest_dt}
+        return {"steps": self.steps, "start": self.stepper.ledger.start, "longest_dt": self.clock.longest_dt}
 
     def restore(self, arrays: Mapping[str, np.ndarray], counters: Mapping[str, float]) -> None:
         """Take over what ``evolving`` and ``counters`` were in this same simulation, at any step of it.
@@ -210,7 +209,8 @@ class Simulation:
         for name, array in own.items():
             array.assign(arrays[name])
         self.stepper.steps = int(counters["steps"])
-        self.stepper.ledger.start, self._longest_dt = counters["start"], counters["longest_dt"]
+        self.stepper.ledger.start = counters["start"]
+        self.clock.fields.longest_dt.fill_(counters["longest_dt"])
         self.stepper.rebuild()
 
     # what a user looks at
@@ -345,14 +345,13 @@ class Simulation:
 
     def _raise_if_bad(self) -> None:
         particle, dt = self.clock.bad, self.clock.free_dt
-        self._longest_dt = max(self._longest_dt, dt)
         if particle is not None:
             x, v, F = self.x[particle], self.v[particle], self.F[particle]
             if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
                 what = f"det F = {np.linalg.det(F):.4g}, must be positive"
             else:
                 what = f"non-finite values, v = {v}, F = {F.tolist()}"
-        elif dt < STALLED * self._longest_dt:
+        elif dt < STALLED * self.clock.longest_dt:
             particle = int(self.stepper.flux.fields.speed.numpy().argmax())
             what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
         else:

@@ -52,6 +52,7 @@ def _make_choose(space: Space) -> Any:
         if clock.bad[0] != WELL:
             dt = wp.float64(0.0)  # the run has failed: time stands still until the host looks
         clock.free_dt[0] = dt
+        clock.longest_dt[0] = wp.max(clock.longest_dt[0], dt)
         left = clock.target[0] - clock.t[0]
         if dt >= left * (wp.float64(1.0) - wp.float64(1.0e-10)):
             dt = wp.max(left, wp.float64(0.0))
@@ -103,7 +104,7 @@ class DeviceClock:
         self._launch = Launcher(device)
         self.cfl = cfl if option.cfl is None else option.cfl
         self.fields = clock_structure(space)()
-        for name in ("t", "dt", "free_dt", "target"):
+        for name in ("t", "dt", "free_dt", "longest_dt", "target"):
             setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
         self.fields.rate = wp.zeros(1, dtype=space.real, device=device)
         self.fields.bad = wp.full(1, WELL, dtype=wp.int32, device=device)
@@ -127,6 +128,11 @@ class DeviceClock:
     def free_dt(self) -> float:
         """Last time step [s] that no output time shortened; reads the device."""
         return float(self.fields.free_dt.numpy()[0])
+
+    @property
+    def longest_dt(self) -> float:
+        """Longest time step [s] so far that no output time shortened; reads the device."""
+        return float(self.fields.longest_dt.numpy()[0])
 
     def aim(self, target: float) -> None:
         """Set the time [s] that must be hit next."""
