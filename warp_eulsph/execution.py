@@ -10,10 +10,8 @@ threads; 0 or 1).
 """
 
 import os
-import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
 
@@ -92,29 +90,6 @@ def graphs(device: Any, n: int) -> bool:
     return n < 2 * LEAST_RANGE if on_cpu else wp.is_conditional_graph_supported()
 
 
-class _Rehearsal(threading.local):
-    """Modules of the kernels that this thread has launched in a rehearsal; None where launches are done."""
-
-    modules: dict[int, Any] | None = None
-
-
-_rehearsal = _Rehearsal()
-
-
-@contextmanager
-def rehearsal(device: Any) -> Iterator[None]:
-    """Launches by a ``Launcher`` inside are not done; at the end their kernels are compiled, several at a time."""
-    modules: dict[int, Any] = {}
-    _rehearsal.modules = modules
-    try:
-        yield
-    finally:
-        _rehearsal.modules = None
-    first, *others = modules.values()
-    wp.force_load(device, [first])  # compiles the header that all others are compiled with
-    wp.force_load(device, others, max_workers=_threads)
-
-
 class Launcher:
     """Launches of one object on one device, recorded: a repeated one costs a fifth of ``wp.launch``.
 
@@ -132,9 +107,6 @@ class Launcher:
         The kernel's first parameter, which is not among ``arguments``, is the index that its thread 0 has. It must
         write to its own particle only.
         """
-        if _rehearsal.modules is not None:
-            _rehearsal.modules[id(kernel.module)] = kernel.module
-            return
         whole = not self.device.is_cpu or self.device.is_capturing  # a graph on the CPU runs on one thread
         ranges = ((0, n),) if whole else _ranges(n)
         commands = self._commands(kernel, ranges, arguments, first)
@@ -150,9 +122,6 @@ class Launcher:
 
     def once(self, kernel: Any, dim: int, arguments: Sequence[Any]) -> None:
         """Launch a kernel of ``dim`` threads that has no such parameter, in one piece."""
-        if _rehearsal.modules is not None:
-            _rehearsal.modules[id(kernel.module)] = kernel.module
-            return
         self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
 
     def forget(self) -> None:

@@ -12,7 +12,6 @@ from .diagnostics import Diagnostics
 from .execution import graphs
 from .fields import allocate
 from .memory import check_memory
-from .rehearsal import compile_ahead
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.flux import Flux, check_reference
 from .scheme.graphs import StepGraphs, recordable
@@ -79,17 +78,6 @@ class Simulation:
         check_memory(self.space, len(X), weight.support * dilation, not reference.fixed, self.device)
         counts = [len(body.x) for body in self.bodies]
         ends = np.cumsum([0, *counts])
-        by_graphs = graphs(self.device, len(X))
-        compile_ahead(
-            self.space,
-            [body.material for body in self.bodies],
-            scheme=scheme,
-            reference=reference,
-            weight=weight,
-            surface_given=self.bodies[0].surface is not None,
-            by_graphs=by_graphs,
-            device=self.device,
-        )
         self.ranges = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}
         self.particles = self._particles(dilation)
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges)
@@ -112,7 +100,7 @@ class Simulation:
         )
         self._check_neighbourhoods(X)
         self._graphs: StepGraphs | None = None
-        self.by_graphs = by_graphs and recordable(self.stepper)
+        self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
 

@@ -222,8 +222,7 @@ class NeighbourLists:
         else:
             if self._builds == 0:
                 self._measure()
-            longest = self._longest or 1.0  # nothing is measured in a rehearsal
-            self.grid.build(self.padded, self.support * longest * QUERY_MARGIN, groups=self.body)
+            self.grid.build(self.padded, self.support * self._longest * QUERY_MARGIN, groups=self.body)
         self._scratch = self.rows.w
         self._search(x, fill=False)
 
