@@ -116,6 +116,7 @@ class Case(Table):
     title: str = Field("", description="what is solved, in one line")
     until: Number = Field(gt=0.0, description="end time [s]")
     parameters: dict[str, Number] = Field({}, description="numbers that formulas may use by name, or formulas of those")
+    definitions: dict[str, str] = Field({}, description="formulas of place and time that others may use by name")
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
     boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from .case import Case
-from .expressions import COORDINATES, FUNCTIONS, nearest
+from .expressions import COORDINATES, FUNCTIONS, Expression, nearest, parse
 from .values import Reading, number
 
 if sys.version_info >= (3, 11):
@@ -68,7 +68,9 @@ def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source:
     """
     data = copy.deepcopy(data)
     parameters, problems = _parameters(data.get("parameters"))
-    context = Reading(parameters, Path(directory))
+    definitions, wrong = _definitions(data.get("definitions"), parameters)
+    problems += wrong
+    context = Reading(parameters, definitions, Path(directory))
     if isinstance(data.get("parameters"), dict):
         data["parameters"] = dict(parameters)
     try:
@@ -125,8 +127,8 @@ def _parameters(given: Any) -> tuple[dict[str, float], list[str]]:
     problems: list[str] = []
     for name, value in given.items() if isinstance(given, dict) else ():
         path = f"parameters.{name}"
-        if not name.isidentifier() or keyword.iskeyword(name) or name in (*COORDINATES, "t", "pi", *FUNCTIONS):
-            problems.append(f"{path}: must be named by letters, digits and _, and not like a coordinate or function")
+        if not _can_be_named(name):
+            problems.append(f"{path}: {_NAMES}")
         elif isinstance(value, str):
             try:
                 parameters[name] = number(value, parameters)
@@ -139,6 +141,33 @@ def _parameters(given: Any) -> tuple[dict[str, float], list[str]]:
         if name.isidentifier() and name not in COORDINATES:
             parameters.setdefault(name, 1.0)  # so that formulas with a wrong one are not wrong too
     return parameters, problems
+
+
+def _definitions(given: Any, parameters: dict[str, float]) -> tuple[dict[str, Expression], list[str]]:
+    """The definitions that make sense, in their order, and what is wrong with the others."""
+    definitions: dict[str, Expression] = {}
+    problems: list[str] = []
+    for name, value in given.items() if isinstance(given, dict) else ():
+        path = f"definitions.{name}"
+        try:
+            if not _can_be_named(name):
+                raise ValueError(_NAMES)
+            if name in parameters:
+                raise ValueError("is the name of a parameter, too")
+            if not isinstance(value, str):
+                raise ValueError(f"must be a formula as text, got {value!r}; numbers are parameters")
+            definitions[name] = parse(value, [*COORDINATES, "t", *parameters], definitions=definitions)
+        except ValueError as error:
+            problems.append(f"{path}: {error}")
+            definitions.setdefault(name, parse("1", []))  # so that formulas with a wrong one are not wrong too
+    return definitions, problems
+
+
+_NAMES = "must be named by letters, digits and _, and not like a coordinate or function"
+
+
+def _can_be_named(name: str) -> bool:
+    return name.isidentifier() and not keyword.iskeyword(name) and name not in (*COORDINATES, "t", "pi", *FUNCTIONS)
 
 
 def _explained(error: ValidationError, data: Any, context: Reading) -> list[str]:

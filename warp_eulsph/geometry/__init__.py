@@ -1,5 +1,6 @@
 """Shapes as particles."""
 
+from .annulus import annulus
 from .filling import BodyCentred, Filling, Lattice, Staggered
 from .lattice import box, nodes
 from .mesh import Patch, mesh
@@ -13,6 +14,7 @@ __all__ = [
     "Patch",
     "Relaxation",
     "Staggered",
+    "annulus",
     "box",
     "cylinder",
     "disc",
