@@ -16,7 +16,7 @@ LAYERS = [
     {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "diagnostics", "memory", "order", "output", "geometry"},
+    {"simulation", "transport", "diagnostics", "memory", "order", "output", "geometry"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

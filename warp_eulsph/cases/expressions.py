@@ -255,7 +255,7 @@ def _source(node: ast.AST, values: Mapping[str, Any]) -> str:
 def device_function(expressions: Sequence[Expression], values: Mapping[str, float], space: Space) -> Any:
     """``wp.func`` (x, t) -> row of the formulas, in the precision of ``space``; ``values`` are constants by name."""
     known: dict[str, Any] = dict(values)
-    lines = []
+    lines: list[str] = []
     for expression in expressions:
         for name, definition in expression.definitions:
             if name not in known:

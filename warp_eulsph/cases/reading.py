@@ -8,10 +8,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from .case import Case
 from .expressions import COORDINATES, FUNCTIONS, Expression, nearest, parse
+from .transport import TransportCase
 from .values import Reading, number
 
 if sys.version_info >= (3, 11):
@@ -32,8 +33,8 @@ class CaseError(ValueError):
         super().__init__("\n".join([f"{source}: {len(self.problems)} problem{'s' * (len(problems) > 1)}", *problems]))
 
 
-def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case:
-    """The case of a TOML file.
+def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case | TransportCase:
+    """The case of a TOML file: of solids, or of a transported quantity where it has a table ``transport``.
 
     Args:
         path: the file; paths in it start from its directory.
@@ -55,8 +56,8 @@ def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case:
     return parse_case(data, directory=Path(path).parent, source=source)
 
 
-def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source: str = "case") -> Case:
-    """The case of a table such as TOML gives, or ``Case.describe``.
+def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source: str = "case") -> Case | TransportCase:
+    """The case of a table such as TOML gives, or ``describe`` of a case.
 
     Args:
         data: the table; it is left as it is.
@@ -74,7 +75,7 @@ def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source:
     if isinstance(data.get("parameters"), dict):
         data["parameters"] = dict(parameters)
     try:
-        case = Case.model_validate(data, context=context)
+        case = (TransportCase if "transport" in data else Case).model_validate(data, context=context)
     except ValidationError as error:
         problems += _explained(error, data, context)
     if problems:
@@ -84,7 +85,8 @@ def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source:
 
 def json_schema() -> dict[str, Any]:
     """The schema of case files as JSON Schema, for editors."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Case.model_json_schema()}
+    schema = TypeAdapter(Case | TransportCase).json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def _load(text: str, source: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any
 
 from ..output import Recording
-from ..simulation import Simulation
+from ..output.fields import Recorded
 
 EXAMPLE = "example:"
 
@@ -23,16 +23,16 @@ class LoadedCase:
 
     Attributes:
         name: for a directory.
-        build: the simulation at its start.
+        build: what is run, at its start.
         until: end time [s].
         recording: what its run keeps.
         origin: where it came from, for ``run.json``: source, overrides, text of the file, all its settings.
     """
 
     name: str
-    build: Callable[[], Simulation]
+    build: Callable[[], Recorded]
     until: float
-    recording: Callable[[Simulation], Recording]
+    recording: Callable[[Any], Recording]
     origin: dict[str, Any]
 
 
@@ -114,12 +114,12 @@ def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tu
     return _on(device, lambda: build(**settings)), float(until), given, settings
 
 
-def _on(device: str | None, build: Callable[[], Simulation]) -> Callable[[], Simulation]:
+def _on(device: str | None, build: Callable[[], Recorded]) -> Callable[[], Recorded]:
     """``build`` where ``device`` is Warp's default device."""
     if device is None:
         return build
 
-    def made() -> Simulation:
+    def made() -> Recorded:
         import warp as wp
 
         with wp.ScopedDevice(device):

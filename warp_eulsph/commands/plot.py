@@ -19,9 +19,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "-f",
         "--field",
-        default="velocity",
         help="what colours the particles: a field, the length of a vector, velocity.x, cauchy_stress.xy or von_mises; "
-        "default %(default)s",
+        "default velocity, or the first field that there is",
     )
     parser.add_argument("--frames", metavar="WHICH", help="such as -1, 0,5,10 or ::2; default -1 for a PNG, else all")
     parser.add_argument(
@@ -37,7 +36,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw; 0, or 2 when it cannot be."""
     from ..output import Run
-    from ..pictures import Picture, film, picture
+    from ..pictures import Picture, default_field, film, picture
     from ..pictures.cells import spacing
 
     try:
@@ -48,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise ValueError(f"a PNG shows one frame, --frames {arguments.frames} are {len(frames)}; choose a .gif")
         view = {} if arguments.view is None else {"view": arguments.view}
         options = Picture(
-            field=arguments.field,
+            field=arguments.field or default_field(found[0]),
             size=arguments.size,
             colours=arguments.colours,
             limits=arguments.limits,

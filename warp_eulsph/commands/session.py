@@ -31,7 +31,7 @@ def carry_out(
     try:
         simulation = case.build()
         recording: Recording = case.recording(simulation)
-        log.info("%s: %d particles on %s", case.name, len(simulation.stepper.U.x), simulation.device)
+        log.info("%s: %d particles on %s", case.name, len(simulation.particles.mass), simulation.device)
         stop = Stop(wall=wall, file=RunDirectory(directory).stop)
         with stop, Progress(until) as progress, logging_redirect_tqdm():
             outcome = record(

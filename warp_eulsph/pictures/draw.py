@@ -115,8 +115,8 @@ def fitted(options: Picture, frames: Iterable[RunFrame]) -> Picture:
     """
     edge, low, high, least, largest = options.spacing, None, None, np.inf, -np.inf
     for frame in frames:
-        values = quantity(frame, options.field).values
-        least, largest = min(least, float(values.min())), max(largest, float(values.max()))
+        lowest, highest = quantity(frame, options.field).range
+        least, largest = min(least, lowest), max(largest, highest)
         x = frame.x.astype(float)
         if edge is None:
             edge = spacing(x)

@@ -16,10 +16,24 @@ class Quantity:
     Attributes:
         label: name and unit.
         values: (n,).
+        exact: those that it should have, (n,); None where the frame does not hold them.
     """
 
     label: str
     values: np.ndarray
+    exact: np.ndarray | None = None
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Least and largest value, those that it should have among them."""
+        both = self.values if self.exact is None else np.concatenate([self.values, self.exact])
+        return float(both.min()), float(both.max())
+
+
+def default_field(frame: RunFrame) -> str:
+    """The field of a frame that a picture shows unless it is told: velocity, a transported value, or the first one."""
+    held = [name for name in frame.units if name != "x"]
+    return next((name for name in ("velocity", "value") if name in held), held[0] if held else "x")
 
 
 def quantity(frame: RunFrame, name: str) -> Quantity:
@@ -53,4 +67,5 @@ def quantity(frame: RunFrame, name: str) -> Quantity:
         values = np.sqrt(np.square(values).reshape(len(values), -1).sum(axis=1))
     shown = "von Mises stress" if field == "von_mises" else field.replace("_", " ")
     shown = f"|{shown}|" if rank and not component else f"{shown} {component}".strip()
-    return Quantity(f"{shown} [{units[field]}]", values)
+    exact = np.asarray(frame["exact"], dtype=float) if name == "value" and "exact" in units else None
+    return Quantity(f"{shown} [{units[field]}]", values, exact)
