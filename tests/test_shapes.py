@@ -9,6 +9,7 @@ from warp_eulsph.geometry import (
     Patch,
     Relaxation,
     Staggered,
+    annulus,
     box,
     cylinder,
     disc,
@@ -112,6 +113,26 @@ def test_relaxed_disc_fits_its_rim_and_is_even():
     assert nearest(relaxed).min() > 0.85 * spacing
     again, _ = disc((0.0, 0.0), 1.0, spacing, relaxation=Relaxation())
     np.testing.assert_array_equal(relaxed, again)
+
+
+def test_annulus_is_whole_graded_and_staggered():
+    x, volume = annulus((1.0, 2.0), 0.75, 1.25, 9)
+    radii, places = np.unique(np.round(np.linalg.norm(x - [1.0, 2.0], axis=1), 9), return_inverse=True)
+    assert len(radii) == 9 and volume.sum() == pytest.approx(np.pi, rel=1e-13)
+    np.testing.assert_allclose(radii[1:] / radii[:-1], (1.25 / 0.75) ** (1 / 9), rtol=1e-8)
+    # As wide as they are high: cells of a size that follows the radius.
+    np.testing.assert_allclose(np.sqrt(volume), 0.0568 * radii[places], rtol=0.01)
+    assert nearest(x).min() > 0.95 * np.sqrt(volume.min())
+    # Half a cell farther round on every other circle
+    angles = [np.sort(np.arctan2(*(x[places == k] - [1.0, 2.0]).T[::-1]) % (2.0 * np.pi))[0] for k in range(9)]
+    np.testing.assert_allclose(angles[1::2], np.pi / (len(x) / 9), rtol=1e-9)
+    for arguments, message in (
+        (((0.0, 0.0), 1.0, 0.5, 9), "annulus: inner must be below outer"),
+        (((0.0, 0.0), 0.5, np.inf, 9), "annulus: outer must be positive and finite"),
+        (((0.0, 0.0), 0.5, 1.0, 1), "annulus: rings must be at least 2, got 1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            annulus(*arguments)
 
 
 def test_cylinder_has_flat_ends_along_any_axis():
