@@ -87,7 +87,7 @@ def test_bodies_by_name_and_periodic_boxes():
 
 
 def test_meshes_are_found_beside_the_case_file(tmp_path):
-    from test_shapes import angle_profile, write
+    from test_meshes import angle_profile, write
 
     write(tmp_path / "angle.vtk", *angle_profile())
     (tmp_path / "case.toml").write_text(

@@ -9,9 +9,11 @@ SHAPES = tuple(getattr(geometry, name) for name in geometry.__all__ if not isins
 
 
 def dimension(shape: Options) -> int:
-    """Dimension of a shape, by its first point; meshes are in 3-D."""
+    """Dimension of a shape, by its first point; outlines are in 2-D, meshes in 3-D."""
     points = [value for _, value in shape if isinstance(value, list)]
-    return len(points[0]) if points else 3
+    if points:
+        return len(points[0])
+    return 2 if shape.target is geometry.outline else 3
 
 
 def particles(shape: Options, path: str) -> tuple[Any, ...]:

@@ -4,6 +4,7 @@ from .annulus import annulus
 from .filling import BodyCentred, Filling, Lattice, Staggered
 from .lattice import box, nodes
 from .mesh import Patch, mesh
+from .outline import outline
 from .relaxation import Relaxation
 from .shapes import cylinder, disc, ring, sphere, tube
 
@@ -20,6 +21,7 @@ __all__ = [
     "disc",
     "mesh",
     "nodes",
+    "outline",
     "ring",
     "sphere",
     "tube",
