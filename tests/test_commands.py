@@ -77,7 +77,7 @@ def test_run_resume_info_check(case, tmp_path, capsys, caplog):
     case.rename(tmp_path / "elsewhere.py")  # the run keeps a copy
     Path(split).rename(tmp_path / "moved")
     assert main(["resume", str(tmp_path / "moved")]) == 0
-    assert f"{case} is gone; using what run.json kept of it" in caplog.text
+    assert f"{case} is gone; using {tmp_path / 'moved' / 'case.py'}" in caplog.text
     one, two = Run(whole), Run(tmp_path / "moved")
     assert len(one) == len(two) == 5
     assert all(a.path.read_bytes() == b.path.read_bytes() for a, b in zip(one, two, strict=True))
@@ -246,3 +246,22 @@ def test_help_loads_no_pictures_no_meshes_no_hdf5():
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip().splitlines()[-1] == "[]"
+
+
+def test_a_run_keeps_its_case_to_be_run_again(tmp_path, caplog):
+    caplog.set_level("INFO")
+    case = tmp_path / "block.toml"
+    case.write_text(TOML)
+    settings = ["-s", "parameters.n=5", "-s", "until=5e-4"]
+    assert main(["run", str(case), *settings, "-o", str(tmp_path / "a"), "--max-wall", "0"]) == 75
+    case.unlink()
+    assert main(["run", str(tmp_path / "a" / "case.toml"), "-o", str(tmp_path / "b")]) == 0
+    assert main(["resume", str(tmp_path / "a")]) == 0
+    assert f"{case} is gone; using {tmp_path / 'a' / 'case.toml'}" in caplog.text
+    one, two = Run(tmp_path / "a"), Run(tmp_path / "b")
+    assert one[-1].N == 25 and one.times[-1] == 5e-4
+    assert (tmp_path / "a" / "log.jsonl").read_bytes() == (tmp_path / "b" / "log.jsonl").read_bytes()
+    assert all(a.path.read_bytes() == b.path.read_bytes() for a, b in zip(one, two, strict=True))
+    # A later run makes room for its own.
+    assert main(["run", str(tmp_path / "b" / "case.toml"), "-o", str(tmp_path / "a"), "--replace"]) == 0
+    assert (tmp_path / "a" / "abandoned" / "0001" / "case.toml").exists()

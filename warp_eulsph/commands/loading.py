@@ -26,7 +26,8 @@ class LoadedCase:
         build: what is run, at its start.
         until: end time [s].
         recording: what its run keeps.
-        origin: where it came from, for ``run.json``: source, overrides, text of the file, all its settings.
+        origin: where it came from, for ``run.json``: source, overrides, all its settings.
+        files: what builds it again, for the directory of its run: text by name.
     """
 
     name: str
@@ -34,6 +35,7 @@ class LoadedCase:
     until: float
     recording: Callable[[Any], Recording]
     origin: dict[str, Any]
+    files: dict[str, str]
 
 
 def load_case(source: str, overrides: Sequence[str] = (), device: str | None = None) -> LoadedCase:
@@ -53,15 +55,14 @@ def load_case(source: str, overrides: Sequence[str] = (), device: str | None = N
     load = {".toml": _load_toml, ".py": _load_python}.get(path.suffix)
     if load is None:
         raise ValueError(f"a case must be a .toml file, a .py file or {EXAMPLE}NAME, got {source!r}")
-    build, until, recording, settings = load(path, overrides, device)
+    build, until, recording, settings, text = load(path, overrides, device)
     origin = {
         "source": source if source.startswith(EXAMPLE) else str(path.resolve()),
         "overrides": list(overrides),
         "device": device,
-        "text": path.read_text(encoding="utf-8"),
         "settings": settings,
     }
-    return LoadedCase(path.stem, build, until, recording, origin)
+    return LoadedCase(path.stem, build, until, recording, origin, {f"case{path.suffix}": text})
 
 
 def examples() -> dict[str, Path]:
@@ -85,19 +86,23 @@ def _path(source: str) -> Path:
 
 
 def _load_toml(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
+    import tomli_w
+
     from ..cases import read_case
 
     case = read_case(path, [*overrides, *([f"device={device}"] if device else [])])
-    return case.build, case.until, case.recording, case.describe()
+    described = case.describe()
+    text = f"# {path.name} with its defaults and settings, as it was run. SI units.\n{tomli_w.dumps(described)}"
+    return case.build, case.until, case.recording, described, text
 
 
 def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
-    module = _module(path)
+    module, text = _module(path), path.read_text(encoding="utf-8")
     case: Any = getattr(module, "CASE", None)
     if hasattr(case, "build"):
         if overrides:
             raise ValueError(f"{path} defines CASE, which takes no settings, got {list(overrides)}")
-        return _on(device, case.build), case.until, case.recording, case.describe()
+        return _on(device, case.build), case.until, case.recording, case.describe(), text
     settings = dict(_setting(override) for override in overrides)
     build, until = getattr(module, "build", None), getattr(module, "UNTIL", None)
     if not callable(build) or not isinstance(until, int | float):
@@ -111,7 +116,7 @@ def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tu
             raise ValueError(f"{path}: build has no setting {wrong[0]!r}; it has {list(known) or 'none'}")
 
     given = getattr(module, "recording", lambda simulation: Recording())
-    return _on(device, lambda: build(**settings)), float(until), given, settings
+    return _on(device, lambda: build(**settings)), float(until), given, settings, text
 
 
 def _on(device: str | None, build: Callable[[], Recorded]) -> Callable[[], Recorded]:

@@ -43,6 +43,7 @@ def carry_out(
                 force=force,
                 replace=replace,
                 case=case.origin,
+                files=case.files,
                 stop=stop,
                 watch=progress,
             )

@@ -60,6 +60,7 @@ def record(
     force: bool = False,
     replace: bool = False,
     case: Mapping[str, Any] | None = None,
+    files: Mapping[str, str] = {},
     stop: Stop | None = None,
     watch: Callable[[Any], object] | None = None,
 ) -> Outcome:
@@ -77,6 +78,7 @@ def record(
         force: resume although the case has changed.
         replace: move a run that is there to ``abandoned/`` in the directory.
         case: how the simulation was built, for ``run.json``.
+        files: what builds it again, text by name: ``case.toml`` or ``case.py``.
         stop: asked after each step whether to stop; None never stops.
         watch: called after each step, to show progress.
 
@@ -107,6 +109,8 @@ def record(
         else:
             _go_on(home, simulation, description, checkpoint, force=force)
         home.write(home.description, {"until": until, "case": dict(case or {}), **description})
+        for name, text in files.items():
+            home.keep(name, text)
         snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, particles=particles, resume=True)
         recorder = _Recorder(
             home, simulation, recording, measures, snapshots, description, resumed=checkpoint is not None
