@@ -128,6 +128,9 @@ def test_wrong_input_is_two(case, tmp_path, capsys):
         ([*run, str(case), "--until", "nan"], "until must be finite"),
         (["resume", str(tmp_path)], "no run in"),
         (["info", str(tmp_path)], "no run in"),
+        (["examples", "pnch"], "unknown example 'pnch'; did you mean 'punch'? examples are amplification, bar,"),
+        ([*run, "punch"], "no case file punch; the example of that name is example:punch"),
+        ([*run, "example:punch", "-s", "n=8"], "'n' is a parameter; write parameters.n=8"),
         (["check", str(tmp_path)], "no run in"),
     ]:
         assert main(arguments) == 2
@@ -135,7 +138,7 @@ def test_wrong_input_is_two(case, tmp_path, capsys):
         assert message in error and "Traceback" not in error
     assert main([*run, str(case), "--until", "1e-4"]) == 0
     assert main([*run, str(case)]) == 2
-    assert "holds a run; resume it" in capsys.readouterr().err
+    assert f"holds a run; go on with warp-eulsph resume {tmp_path / 'run'}, choose" in capsys.readouterr().err
     assert main([*run, str(case), "--until", "1e-4", "--replace"]) == 0
     case.write_text(CASE.replace("young=17e6", "young=18e6"))
     assert main(["resume", str(tmp_path / "run"), "--until", "2e-4"]) == 2
@@ -265,3 +268,30 @@ def test_a_run_keeps_its_case_to_be_run_again(tmp_path, caplog):
     # A later run makes room for its own.
     assert main(["run", str(tmp_path / "b" / "case.toml"), "-o", str(tmp_path / "a"), "--replace"]) == 0
     assert (tmp_path / "a" / "abandoned" / "0001" / "case.toml").exists()
+
+
+def test_without_a_command_it_says_what_there_is(capsys):
+    assert main([]) == 2
+    said = capsys.readouterr().out
+    assert all(f"    {name} " in said for name in ("run", "resume", "plot", "examples", "validate", "bench"))
+    assert main(["--version"]) == 0
+    assert re.fullmatch(r"warp-eulsph \S+ warp-lang \S+\n", capsys.readouterr().out)
+
+
+def test_examples_are_listed_and_printed_to_start_from(tmp_path, capsys):
+    assert main(["examples"]) == 0
+    listed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert listed.keys() == examples().keys() and listed["punch"] == "Punched rubber block"
+    assert main(["examples", "punch"]) == 0
+    printed = capsys.readouterr().out
+    assert printed == examples()["punch"].read_text(encoding="utf-8")
+
+
+def test_a_finished_run_says_that_nothing_is_left(case, tmp_path, caplog):
+    caplog.set_level("INFO")
+    assert main(["run", str(case), "-o", str(tmp_path / "run"), "--until", "1e-4"]) == 0
+    assert "nothing left" not in caplog.text
+    assert main(["resume", str(tmp_path / "run"), "--until", "2e-4"]) == 0
+    assert "nothing left" not in caplog.text
+    assert main(["resume", str(tmp_path / "run")]) == 0
+    assert "there was nothing left to do; --until takes the run on to a later time" in caplog.text

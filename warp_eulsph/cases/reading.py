@@ -108,6 +108,9 @@ def _override(data: dict[str, Any], override: str) -> str | None:
         value = tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):
         value = text.strip()
+    parameters = data.get("parameters")
+    if len(keys) == 1 and isinstance(parameters, dict) and keys[0] in parameters:
+        return f"override {override!r}: {keys[0]!r} is a parameter; write parameters.{override.strip()}"
     place: Any = data
     for depth, key in enumerate(keys):
         if isinstance(place, list):

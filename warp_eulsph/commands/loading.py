@@ -49,9 +49,10 @@ def load_case(source: str, overrides: Sequence[str] = (), device: str | None = N
     Raises:
         ValueError: no such file or example, or one that is wrong; it says what.
     """
-    path = _path(source)
+    path = example_path(source.removeprefix(EXAMPLE)) if source.startswith(EXAMPLE) else Path(source)
     if not path.is_file():
-        raise ValueError(f"no case file {path}")
+        hint = f"; the example of that name is {EXAMPLE}{path.stem}" if path.stem in examples() else ""
+        raise ValueError(f"no case file {path}{hint}")
     load = {".toml": _load_toml, ".py": _load_python}.get(path.suffix)
     if load is None:
         raise ValueError(f"a case must be a .toml file, a .py file or {EXAMPLE}NAME, got {source!r}")
@@ -74,14 +75,17 @@ def examples() -> dict[str, Path]:
     return {}
 
 
-def _path(source: str) -> Path:
-    if not source.startswith(EXAMPLE):
-        return Path(source)
-    name, known = source.removeprefix(EXAMPLE), examples()
+def example_path(name: str) -> Path:
+    """The case file of an example.
+
+    Raises:
+        ValueError: no such example; it names those that there are.
+    """
+    known = examples()
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"unknown example {name!r}{hint} Examples: {', '.join(known) or 'none are installed'}")
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise ValueError(f"unknown example {name!r}; {hint}examples are {', '.join(known) or 'not installed'}")
     return known[name]
 
 

@@ -27,7 +27,9 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--limits", type=_numbers(2), metavar="LOW,HIGH", help="range of the colours; default all of it"
     )
     parser.add_argument("--colours", default="viridis", help="colour map of matplotlib; default %(default)s")
-    parser.add_argument("--size", type=_numbers(2, int), default=(1000, 700), metavar="W,H", help="pixels")
+    parser.add_argument(
+        "--size", type=_numbers(2, int), default=(1000, 700), metavar="W,H", help="pixels; default 1000,700"
+    )
     parser.add_argument("--view", type=_numbers(3), metavar="X,Y,Z", help="where 3-D is looked at from; y points up")
     parser.add_argument("--fps", type=float, default=10.0, help="frames per second of a film; default %(default)s")
     parser.set_defaults(run_command=run)
@@ -41,6 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     try:
         single = arguments.output.endswith(".png")
+        if not arguments.output.endswith((".png", ".gif", ".mp4")):
+            raise ValueError(f"the ending must be .png, .gif or .mp4, got {arguments.output!r}")
         found = Run(arguments.directory)
         frames = chosen(len(found), arguments.frames or ("-1" if single else ":"))
         if single and len(frames) > 1:

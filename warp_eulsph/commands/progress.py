@@ -80,8 +80,12 @@ def health(simulation: Recorded) -> str:
 
 
 def energy_drift(simulation: Simulation) -> float:
-    """Energy that loads and conditions do not explain over the energy there is [-]; what is dissipated counts."""
+    """Energy that loads and conditions do not explain over that which there is, was, or went through them [-].
+
+    What is dissipated counts.
+    """
     energy = simulation.energy()
     start = simulation.stepper.ledger.start
     gained = energy["total"] - start - energy["external"] - energy["constraint"]
-    return gained / max(abs(energy["total"]), abs(start), 1e-300)
+    scale = max(abs(energy["total"]), abs(start), abs(energy["external"]), abs(energy["constraint"]), 1e-300)
+    return gained / scale

@@ -32,7 +32,9 @@ def carry_out(
         simulation = case.build()
         recording: Recording = case.recording(simulation)
         log.info("%s: %d particles on %s", case.name, len(simulation.particles.mass), simulation.device)
-        stop = Stop(wall=wall, file=RunDirectory(directory).stop)
+        home = RunDirectory(directory)
+        before = home.read(home.status).get("step") if resume else None
+        stop = Stop(wall=wall, file=home.stop)
         with stop, Progress(until) as progress, logging_redirect_tqdm():
             outcome = record(
                 simulation,
@@ -63,6 +65,8 @@ def carry_out(
         )
         return STOPPED
     log.info("done: step %d, t = %.8g s, in %s", outcome.step, outcome.time, directory)
+    if outcome.step == before:
+        log.info("there was nothing left to do; --until takes the run on to a later time")
     return DONE
 
 

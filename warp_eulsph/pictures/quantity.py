@@ -42,7 +42,8 @@ def quantity(frame: RunFrame, name: str) -> Quantity:
     Args:
         frame: of a run.
         name: of a field that the frame has or derives, such as ``J`` or ``von_mises``; a vector or tensor gives its
-            length; ``velocity.x``, ``cauchy_stress.xy``, ``principal_stresses.z`` give a component.
+            length, in 1-D a vector itself; ``velocity.x``, ``cauchy_stress.xy``, ``principal_stresses.z`` give a
+            component.
 
     Raises:
         ValueError: no such field or component in the frame.
@@ -63,9 +64,11 @@ def quantity(frame: RunFrame, name: str) -> Quantity:
             example = f"components such as {field}.{'x' * rank}" if rank else "no components"
             raise ValueError(f"{field} has {example}, got {name!r}")
         values = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
+    elif values.shape[1:] == (1,):  # along a line a vector is a number with a sign
+        values = values[:, 0]
     elif rank:
         values = np.sqrt(np.square(values).reshape(len(values), -1).sum(axis=1))
     shown = "von Mises stress" if field == "von_mises" else field.replace("_", " ")
-    shown = f"|{shown}|" if rank and not component else f"{shown} {component}".strip()
+    shown = f"|{shown}|" if rank and not component and frame.x.shape[1] > 1 else f"{shown} {component}".strip()
     exact = np.asarray(frame["exact"], dtype=float) if name == "value" and "exact" in units else None
     return Quantity(f"{shown} [{units[field]}]", values, exact)
