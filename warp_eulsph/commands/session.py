@@ -64,6 +64,7 @@ def carry_out(
             directory,
         )
         return STOPPED
+    home.stop.unlink(missing_ok=True)  # asked for too late
     log.info("done: step %d, t = %.8g s, in %s", outcome.step, outcome.time, directory)
     if outcome.step == before:
         log.info("there was nothing left to do; --until takes the run on to a later time")
