@@ -28,7 +28,7 @@ LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
 # What the command line prints is its result
-FRONT_ENDS = {f"bench/{name}.py" for name in ("command", "equal_error", "snapshot_cost")}
+FRONT_ENDS = {"cli.py"} | {f"bench/{name}.py" for name in ("command", "equal_error", "snapshot_cost")}
 FRONT_ENDS |= {"validation/command.py", "validation/step_cost.py"}
 FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 
