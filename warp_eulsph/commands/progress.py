@@ -58,16 +58,15 @@ class Progress:
         t, step = simulation.t, simulation.steps
         speed = (step - self._shown[1]) * len(simulation.particles.mass) / max(now - self._shown[0], 1e-9)
         self._shown = (now, step)
-        text = (
-            f"step {step}, t = {t:.4g} s, dt = {simulation.dt:.3g} s, {speed:.3g} particle-steps/s, "
-            f"{health(simulation)}"
-        )
+        rate = f"dt = {simulation.dt:.3g} s, {speed:.3g} particle-steps/s"
         if self._bar is not None:
             self._bar.n = min(t - first, self._bar.total)
-            self._bar.set_postfix_str(text)
+            # What matters first: a narrow terminal cuts the rest.
+            self._bar.set_postfix_str(f"{health(simulation)}, step {step}, {rate}, t = {t:.4g} s")
             return
         done = (t - first) / max(self.until - first, 1e-300)
         left = (now - began) * (1.0 - done) / max(done, 1e-9)
+        text = f"step {step}, t = {t:.4g} s, {rate}, {health(simulation)}"
         log.info("%s, %.1f %% of %.4g s, %.0f s left", text, 100.0 * t / self.until, self.until, left)
 
 

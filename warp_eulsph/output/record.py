@@ -161,7 +161,7 @@ def _compare(checkpoint: Checkpoint, simulation: Recorded, description: Mapping[
         listed = "\n  ".join(changes)
         raise ChangedCaseError(
             f"the case has changed since the checkpoint of step {checkpoint.step}:\n  {listed}\n"
-            "undo the changes, run it in another directory, or force the resume"
+            "undo the changes, run it in another directory, or go on all the same with --force (force=True)"
         )
     for change in changes:
         log.warning("resuming a changed case: %s", change)
