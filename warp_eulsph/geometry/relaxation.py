@@ -82,8 +82,10 @@ def _make_push() -> Any:
         total = wp.vec3d()
         for b in wp.hash_grid_query(grid, x, reach):
             away = x - places[b]
-            r = wp.length(away)
-            if b != a and r < reach and r > wp.float64(0.0):
+            square = wp.dot(away, away)
+            # Most candidates are too far away, which shows without a root.
+            if b != a and square < reach * reach and square > wp.float64(0.0):
+                r = wp.sqrt(square)
                 near = wp.float64(1.0) - r / reach
                 total += away * (near * near * near / r)
         out[a] = total
