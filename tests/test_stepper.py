@@ -65,7 +65,9 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
     """M12 with κ = 1: at every state correction + dissipation take energy; with κ = ∞ the correction feeds it."""
 
     def powers(stepper, kappa):
-        stabiliser = es.PairAreas(kappa=kappa).build(stepper.space, stepper.particles, stepper.flux, stepper.device)
+        stabiliser = es.PairAreas(kappa=kappa).build(
+            stepper.space, stepper.particles, stepper.flux, stepper.policy, stepper.device
+        )
         stabiliser.refresh(stepper.configuration, stepper.U)
         stepper._velocity_gradient(stepper.U)
         stepper._stress(stepper.U)

@@ -13,7 +13,7 @@ from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
 from .dissipation import UpwindForces
 from .flux import Flux
-from .reference import Configuration
+from .reference import Configuration, ReferencePolicy
 
 # Share of the residual that a sweep corrects, by dimension. The saw-tooth, the wave that pairs particles up, has the
 # eigenvalue 1.85, 1.35, 1.05 of the graph Laplacian over its diagonal in lattices at dilation 1.3: these shares take
@@ -48,7 +48,8 @@ class Balance:
     Args:
         sweeps: relaxation sweeps per refresh, from ψ = 0.
         bound: largest |x̂ − x| over the particle's spacing in the reference.
-        lean: largest λ; 0 closes alike in all directions.
+        lean: largest λ in a reference that lasts one step, less by √k in one that lasts k; 0 closes alike in all
+            directions.
     """
 
     sweeps: int = 5
@@ -63,9 +64,9 @@ class Balance:
         if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 2.0):
             raise ValueError(f"lean must be in [0, 2], got {self.lean}; 1.5 is the tested value")
 
-    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "BalancedPairs":
+    def build(self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, device: Any) -> "BalancedPairs":
         """Allocate."""
-        return BalancedPairs(self, space, particles, flux, device)
+        return BalancedPairs(self, space, particles, flux, policy, device)
 
 
 @functools.cache
@@ -180,10 +181,12 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    def __init__(self, option: Balance, space: Space, particles: Any, flux: Flux, device: Any):
+    def __init__(self, option: Balance, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, device: Any):
         super().__init__(space, device)
         self.flux = flux.fields  # of the last step when a refresh asks for it
         self.option, self.particles, n = option, particles, len(particles.mass)
+        # A push goes on until the next refresh looks at it again: the longer a reference lasts, the less it may push.
+        self.lean = option.lean / math.sqrt(policy.lasts)
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
 
     def evolving(self) -> dict[str, wp.array]:
@@ -204,6 +207,6 @@ class BalancedPairs(UpwindForces):
                 old, new = new, old
             arguments = [reference, near, configuration.K, self.defect, old, new]
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
-        arguments = [self.particles, reference, self.psi, self.flux, self.option.bound, self.option.lean]
+        arguments = [self.particles, reference, self.psi, self.flux, self.option.bound, self.lean]
         self._launch(_make_shift(self.space), n, arguments)
         self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])

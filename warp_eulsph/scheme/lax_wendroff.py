@@ -179,7 +179,7 @@ class LaxWendroffStepper:
         self.steps = 0
         self.stabiliser: Stabiliser = UpwindForces(space, device)
         if options.correction is not None and (surface_given or not policy.fixed):
-            self.stabiliser = options.correction.build(space, particles, flux, device)
+            self.stabiliser = options.correction.build(space, particles, flux, policy, device)
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:
             self.limiter = options.limiter.build(space, particles, configuration, device)
