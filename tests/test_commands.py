@@ -77,7 +77,7 @@ def test_run_resume_info_check(case, tmp_path, capsys, caplog):
     case.rename(tmp_path / "elsewhere.py")  # the run keeps a copy
     Path(split).rename(tmp_path / "moved")
     assert main(["resume", str(tmp_path / "moved")]) == 0
-    assert f"{case} is gone; using what run.json kept of it" in caplog.text
+    assert f"{case} is gone; using {tmp_path / 'moved' / 'case.py'}" in caplog.text
     one, two = Run(whole), Run(tmp_path / "moved")
     assert len(one) == len(two) == 5
     assert all(a.path.read_bytes() == b.path.read_bytes() for a, b in zip(one, two, strict=True))
@@ -128,6 +128,9 @@ def test_wrong_input_is_two(case, tmp_path, capsys):
         ([*run, str(case), "--until", "nan"], "until must be finite"),
         (["resume", str(tmp_path)], "no run in"),
         (["info", str(tmp_path)], "no run in"),
+        (["examples", "pnch"], "unknown example 'pnch'; did you mean 'punch'? examples are amplification, bar,"),
+        ([*run, "punch"], "no case file punch; the example of that name is example:punch"),
+        ([*run, "example:punch", "-s", "n=8"], "'n' is a parameter; write parameters.n=8"),
         (["check", str(tmp_path)], "no run in"),
     ]:
         assert main(arguments) == 2
@@ -135,7 +138,7 @@ def test_wrong_input_is_two(case, tmp_path, capsys):
         assert message in error and "Traceback" not in error
     assert main([*run, str(case), "--until", "1e-4"]) == 0
     assert main([*run, str(case)]) == 2
-    assert "holds a run; resume it" in capsys.readouterr().err
+    assert f"holds a run; go on with warp-eulsph resume {tmp_path / 'run'}, choose" in capsys.readouterr().err
     assert main([*run, str(case), "--until", "1e-4", "--replace"]) == 0
     case.write_text(CASE.replace("young=17e6", "young=18e6"))
     assert main(["resume", str(tmp_path / "run"), "--until", "2e-4"]) == 2
@@ -246,3 +249,49 @@ def test_help_loads_no_pictures_no_meshes_no_hdf5():
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip().splitlines()[-1] == "[]"
+
+
+def test_a_run_keeps_its_case_to_be_run_again(tmp_path, caplog):
+    caplog.set_level("INFO")
+    case = tmp_path / "block.toml"
+    case.write_text(TOML)
+    settings = ["-s", "parameters.n=5", "-s", "until=5e-4"]
+    assert main(["run", str(case), *settings, "-o", str(tmp_path / "a"), "--max-wall", "0"]) == 75
+    case.unlink()
+    assert main(["run", str(tmp_path / "a" / "case.toml"), "-o", str(tmp_path / "b")]) == 0
+    assert main(["resume", str(tmp_path / "a")]) == 0
+    assert f"{case} is gone; using {tmp_path / 'a' / 'case.toml'}" in caplog.text
+    one, two = Run(tmp_path / "a"), Run(tmp_path / "b")
+    assert one[-1].N == 25 and one.times[-1] == 5e-4
+    assert (tmp_path / "a" / "log.jsonl").read_bytes() == (tmp_path / "b" / "log.jsonl").read_bytes()
+    assert all(a.path.read_bytes() == b.path.read_bytes() for a, b in zip(one, two, strict=True))
+    # A later run makes room for its own.
+    assert main(["run", str(tmp_path / "b" / "case.toml"), "-o", str(tmp_path / "a"), "--replace"]) == 0
+    assert (tmp_path / "a" / "abandoned" / "0001" / "case.toml").exists()
+
+
+def test_without_a_command_it_says_what_there_is(capsys):
+    assert main([]) == 2
+    said = capsys.readouterr().out
+    assert all(f"    {name} " in said for name in ("run", "resume", "plot", "examples", "validate", "bench"))
+    assert main(["--version"]) == 0
+    assert re.fullmatch(r"warp-eulsph \S+ warp-lang \S+\n", capsys.readouterr().out)
+
+
+def test_examples_are_listed_and_printed_to_start_from(tmp_path, capsys):
+    assert main(["examples"]) == 0
+    listed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert listed.keys() == examples().keys() and listed["punch"] == "Punched rubber block"
+    assert main(["examples", "punch"]) == 0
+    printed = capsys.readouterr().out
+    assert printed == examples()["punch"].read_text(encoding="utf-8")
+
+
+def test_a_finished_run_says_that_nothing_is_left(case, tmp_path, caplog):
+    caplog.set_level("INFO")
+    assert main(["run", str(case), "-o", str(tmp_path / "run"), "--until", "1e-4"]) == 0
+    assert "nothing left" not in caplog.text
+    assert main(["resume", str(tmp_path / "run"), "--until", "2e-4"]) == 0
+    assert "nothing left" not in caplog.text
+    assert main(["resume", str(tmp_path / "run")]) == 0
+    assert "there was nothing left to do; --until takes the run on to a later time" in caplog.text

@@ -1,6 +1,8 @@
 """The house rules that a program can hold: layers, who imports HDF5, lengths, no print."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,7 +18,7 @@ LAYERS = [
     {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "diagnostics", "memory", "order", "output", "geometry"},
+    {"simulation", "transport", "diagnostics", "memory", "order", "output", "geometry"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},
@@ -26,7 +28,7 @@ LAYER = {room: k for k, rooms in enumerate(LAYERS) for room in rooms}
 LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
 # What the command line prints is its result
-FRONT_ENDS = {f"bench/{name}.py" for name in ("command", "equal_error", "snapshot_cost")}
+FRONT_ENDS = {"cli.py"} | {f"bench/{name}.py" for name in ("command", "equal_error", "snapshot_cost")}
 FRONT_ENDS |= {f"validation/{name}.py" for name in ("command", "punch_elements", "step_cost")}
 FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 
@@ -113,9 +115,22 @@ HEAVY = ("h5py", "matplotlib", "vtkmodules", "pyvista", "meshio", "PIL", "pydant
     ],
 )
 def test_start_does_not_load_hdf5_pictures_or_meshes(code):
-    import subprocess
-    import sys
-
     code = f"import sys\n{code}\nprint([m for m in {HEAVY} if m in sys.modules])"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip().splitlines()[-1] == "[]"
+
+
+def test_cases_run_without_any_extra(tmp_path):
+    """As after a plain ``pip install warp_eulsph``: what pictures, meshes and data sets need is not there."""
+    extras = ("matplotlib", "PIL", "pyvista", "vtkmodules", "meshio", "xarray", "pandas", "scipy", "imageio_ffmpeg")
+    code = (
+        f"import sys\nfor name in {extras}: sys.modules[name] = None\n"
+        "from warp_eulsph.cli import main\n"
+        "assert main(['run', 'example:cosine_profile', '-o', 'a']) == 0\n"
+        "assert main(['run', 'example:punch', '-s', 'parameters.n=6', '-s', 'until=1e-3', '-o', 'b']) == 0\n"
+        "assert main(['info', 'b']) == main(['check', 'b']) == main(['export', 'b', 'b.csv']) == 0\n"
+        "assert main(['plot', 'b']) == 2\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert "pictures need matplotlib: pip install 'warp_eulsph[viz]'" in ran.stderr

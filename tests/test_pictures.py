@@ -59,8 +59,9 @@ def test_frames_that_are_not_there_are_named(text):
 def test_quantities_by_name(run):
     snapshot = run[-1]
     v, sigma = snapshot.v.astype(float), snapshot.cauchy_stress.astype(float)
-    np.testing.assert_allclose(quantity(snapshot, "velocity").values, np.linalg.norm(v, axis=1))
-    assert quantity(snapshot, "velocity").label == "|velocity| [m/s]"
+    along = v.shape[1] == 1  # a line, on which a velocity has a sign
+    np.testing.assert_allclose(quantity(snapshot, "velocity").values, v[:, 0] if along else np.linalg.norm(v, axis=1))
+    assert quantity(snapshot, "velocity").label == ("velocity [m/s]" if along else "|velocity| [m/s]")
     np.testing.assert_array_equal(quantity(snapshot, "velocity.x").values, v[:, 0])
     np.testing.assert_array_equal(quantity(snapshot, "cauchy_stress.xz").values, sigma[:, 0, 2])
     np.testing.assert_array_equal(quantity(snapshot, "J").values, snapshot.J)
@@ -95,6 +96,12 @@ def test_cells_are_those_of_the_deformation():
         np.pad(cells[:, 1] - cells[:, 0], ((0, 0), (0, 1))), np.pad(cells[:, 2] - cells[:, 0], ((0, 0), (0, 1)))
     )
     np.testing.assert_allclose(areas[:, 2], volume)
+    # Where the frame says how much particles hold, each is drawn as large as that.
+    snapshot.units = {"deformation_gradient": "-", "volume": "m^d"}
+    type(snapshot).__getitem__ = lambda self, name: np.linspace(0.1, 0.2, len(x))
+    cells = corners(snapshot, 0.25)
+    sides = cells[:, 1] - cells[:, 0], cells[:, 2] - cells[:, 0]
+    np.testing.assert_allclose(np.linalg.det(np.stack(sides, axis=1)), np.linspace(0.1, 0.2, len(x)))
 
 
 def test_picture_shows_the_values(run, tmp_path):
@@ -131,8 +138,13 @@ def test_film_as_mp4_needs_ffmpeg(run, tmp_path, monkeypatch):
 
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    with pytest.raises(FileNotFoundError, match="needs the program ffmpeg"):
-        film(run, tmp_path / "a.mp4")
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "imageio_ffmpeg", None)
+        with pytest.raises(
+            FileNotFoundError, match="needs the program ffmpeg; install it or pip install imageio-ffmpeg"
+        ):
+            film(run, tmp_path / "a.mp4")
+    assert film(run, tmp_path / "a.mp4", Picture(size=(300, 200))).stat().st_size > 1000  # by the package's own
     program = tmp_path / "bin" / "ffmpeg"
     program.symlink_to(imageio_ffmpeg.get_ffmpeg_exe())
     path = film(run, tmp_path / "a.mp4", Picture(size=(301, 201)), fps=2.0)
@@ -301,7 +313,7 @@ def test_commands_draw_and_export(run, tmp_path, capsys):
     [
         (["plot", "nowhere"], "no run in nowhere"),
         (["plot", "RUN", "-f", "speed"], "a picture must be coloured by one of"),
-        (["plot", "RUN", "-o", "a.jpg"], "the ending of a film must be one of .gif, .mp4"),
+        (["plot", "RUN", "-o", "a.jpg"], "the ending must be .png, .gif or .mp4"),
         (["plot", "RUN", "--frames", ":"], "a PNG shows one frame, --frames : are 4"),
         (["plot", "RUN", "-o", "a.gif", "--fps", "0"], "frames per second must be positive"),
         (["export", "RUN", "a.txt"], "a.txt: the ending must be one of"),
@@ -333,4 +345,4 @@ def test_schema_command_prints_the_schema(capsys):
     import json
 
     assert main(["schema"]) == 0
-    assert json.loads(capsys.readouterr().out)["properties"]["until"]["description"] == "end time [s]"
+    assert json.loads(capsys.readouterr().out)["$defs"]["Case"]["properties"]["until"]["description"] == "end time [s]"

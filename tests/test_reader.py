@@ -14,7 +14,7 @@ from test_snapshots import pad
 import warp_eulsph as es
 from warp_eulsph.output import Recording, Run, SnapshotWriter, read_snapshot, record
 from warp_eulsph.output.manifest import Manifest, entry_of
-from warp_eulsph.schedule import EverySteps, EveryTime
+from warp_eulsph.schedule import EveryTime
 
 
 @pytest.fixture(scope="module")
@@ -206,67 +206,6 @@ def test_opening_a_thousand_snapshots_takes_half_a_second(tmp_path):
     assert time.process_time() - begin < 0.5
 
 
-def vtk_steps(path):
-    """Every step of the temporal index by VTK: (time, poly data)."""
-    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-    from vtkmodules.vtkIOHDF import vtkHDFReader
-
-    reader = vtkHDFReader()
-    reader.SetFileName(str(path))
-    reader.UpdateInformation()
-    times = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
-    assert reader.GetNumberOfSteps() == len(times)
-    for k, time_ in enumerate(times):
-        reader.SetStep(k)
-        reader.Update()
-        yield time_, reader.GetOutput()
-
-
-@pytest.mark.parametrize("dim", [1, 2, 3])
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_vtk_reads_the_index_bit_for_bit_after_a_move(dim, dtype, tmp_path, monkeypatch):
-    from test_snapshots import simulate
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    simulation = simulate(dim)
-    record(simulation, tmp_path / "here", 3e-3, Recording(snapshots=EverySteps(1), dtype=dtype))
-    (tmp_path / "here").rename(tmp_path / "there")
-    monkeypatch.chdir("/")
-    run = Run(tmp_path / "there")
-    assert len(run) >= 3
-    for frame, (time_, data) in zip(run, vtk_steps(tmp_path / "there" / "run.vtkhdf"), strict=True):
-        assert time_ == frame.time and data.GetFieldData().GetArray("Step").GetValue(0) == frame.step
-        assert data.GetNumberOfPoints() == data.GetNumberOfVerts() == data.GetNumberOfCells() == frame.N
-        assert [data.GetCell(k).GetPointId(0) for k in range(frame.N)] == list(range(frame.N))
-        points = vtk_to_numpy(data.GetPoints().GetData())
-        assert points.dtype == dtype
-        np.testing.assert_array_equal(points, pad(frame.x))
-        for name in frame.units.keys() - {"x"}:
-            array = vtk_to_numpy(data.GetPointData().GetArray(name))
-            np.testing.assert_array_equal(array, pad(frame[name]))
-        assert data.GetPointData().GetTensors() is not None and data.GetPointData().GetVectors() is not None
-
-
-def test_vtk_reads_an_index_over_changing_numbers_of_particles(tmp_path):
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    writer, sizes = SnapshotWriter(tmp_path, fields=["velocity"]), [5, 6, 4, 4, 7]
-    for step, n in enumerate(sizes):
-        s = (np.arange(n) + 0.5) / n
-        x = np.stack(np.meshgrid(s, s, indexing="ij"), -1).reshape(-1, 2)
-        body = es.Body(x=x, volume=n**-2, material=plate().bodies[0].material, velocity=x)
-        simulation = es.Simulation(body)
-        simulation.stepper.steps = step
-        writer.write(simulation)
-    writer.finish()
-    run = Run(tmp_path)
-    for frame, n, (_, data) in zip(run, sizes, vtk_steps(writer.index), strict=True):
-        assert frame.N == n**2 == data.GetNumberOfPoints() == data.GetNumberOfVerts()
-        assert [data.GetCell(k).GetPointId(0) for k in range(frame.N)] == list(range(frame.N))
-        np.testing.assert_array_equal(vtk_to_numpy(data.GetPoints().GetData()), pad(frame.x))
-        np.testing.assert_array_equal(vtk_to_numpy(data.GetPointData().GetArray("velocity")), pad(frame.v))
-
-
 def test_pyvista_reads_the_series_with_its_times(directory):
     import pyvista
 
@@ -277,18 +216,6 @@ def test_pyvista_reads_the_series_with_its_times(directory):
         data = reader.read()
         np.testing.assert_array_equal(data.points, pad(frame.x))
         np.testing.assert_array_equal(data.point_data["pressure"], frame.pressure)
-
-
-def test_lost_snapshot_reads_as_not_a_number(directory, tmp_path):
-    import shutil
-
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    shutil.copytree(directory, tmp_path / "run")
-    Run(tmp_path / "run")[2].path.unlink()
-    for k, (_, data) in enumerate(vtk_steps(tmp_path / "run" / "run.vtkhdf")):
-        assert np.isnan(vtk_to_numpy(data.GetPoints().GetData())).all() == (k == 2)
-        assert (vtk_to_numpy(data.GetPointData().GetArray("body")) == -1).all() == (k == 2)
 
 
 def test_index_layout_that_old_readers_need(directory):

@@ -1,4 +1,4 @@
-"""Shapes as particles: exact volumes, symmetry, evenness, mesh files, and errors that name the cause."""
+"""Shapes as particles: exact volumes, symmetry, evenness, and errors that name the cause."""
 
 import numpy as np
 import pytest
@@ -6,13 +6,12 @@ import pytest
 from warp_eulsph.geometry import (
     BodyCentred,
     Lattice,
-    Patch,
     Relaxation,
     Staggered,
+    annulus,
     box,
     cylinder,
     disc,
-    mesh,
     ring,
     sphere,
     tube,
@@ -114,6 +113,26 @@ def test_relaxed_disc_fits_its_rim_and_is_even():
     np.testing.assert_array_equal(relaxed, again)
 
 
+def test_annulus_is_whole_graded_and_staggered():
+    x, volume = annulus((1.0, 2.0), 0.75, 1.25, 9)
+    radii, places = np.unique(np.round(np.linalg.norm(x - [1.0, 2.0], axis=1), 9), return_inverse=True)
+    assert len(radii) == 9 and volume.sum() == pytest.approx(np.pi, rel=1e-13)
+    np.testing.assert_allclose(radii[1:] / radii[:-1], (1.25 / 0.75) ** (1 / 9), rtol=1e-8)
+    # As wide as they are high: cells of a size that follows the radius.
+    np.testing.assert_allclose(np.sqrt(volume), 0.0568 * radii[places], rtol=0.01)
+    assert nearest(x).min() > 0.95 * np.sqrt(volume.min())
+    # Half a cell farther round on every other circle
+    angles = [np.sort(np.arctan2(*(x[places == k] - [1.0, 2.0]).T[::-1]) % (2.0 * np.pi))[0] for k in range(9)]
+    np.testing.assert_allclose(angles[1::2], np.pi / (len(x) / 9), rtol=1e-9)
+    for arguments, message in (
+        (((0.0, 0.0), 1.0, 0.5, 9), "annulus: inner must be below outer"),
+        (((0.0, 0.0), 0.5, np.inf, 9), "annulus: outer must be positive and finite"),
+        (((0.0, 0.0), 0.5, 1.0, 1), "annulus: rings must be at least 2, got 1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            annulus(*arguments)
+
+
 def test_cylinder_has_flat_ends_along_any_axis():
     x, _ = cylinder((0.0, 0.0, 0.0), (1.05, 0.0, 0.0), 0.5, 0.1)
     assert x[:, 0].min() == pytest.approx(1.05 / 20) and x[:, 0].max() == pytest.approx(1.05 - 1.05 / 20)
@@ -139,111 +158,3 @@ def test_cylinder_has_flat_ends_along_any_axis():
 def test_errors_name_the_cause(call, message):
     with pytest.raises(ValueError, match=message):
         call()
-
-
-# meshes
-
-
-def brick(lower, upper):
-    """Corners and outward triangles of a box."""
-    corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    triangles = np.array([[q[0], q[a], q[a + 1]] for q in quads for a in (1, 2)])
-    return np.array(lower) + corners * (np.array(upper) - lower), triangles
-
-
-def angle_profile():
-    """Corners and triangles of an L: a unit square 1 m deep less its upper right quarter; concave."""
-    outline = np.array([[0, 0], [1, 0], [1, 0.5], [0.5, 0.5], [0.5, 1], [0, 1]], dtype=float)
-    points = np.concatenate([np.pad(outline, ((0, 0), (0, 1))), np.pad(outline, ((0, 0), (0, 1)), constant_values=1.0)])
-    flat = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [3, 4, 5]])
-    sides = [t for k in range(6) for t in ([k, (k + 1) % 6, (k + 1) % 6 + 6], [k, (k + 1) % 6 + 6, k + 6])]
-    return points, np.concatenate([flat[:, ::-1], flat + 6, sides])
-
-
-def write(path, points, triangles, **options):
-    import meshio
-
-    meshio.Mesh(points, [("triangle", np.asarray(triangles))]).write(path, **options)
-    return path
-
-
-@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "vtk", "vtu", "msh"])
-def test_concave_mesh_is_filled_with_its_volume(tmp_path, suffix):
-    options = {"msh": {"file_format": "gmsh22"}}.get(suffix, {})
-    file = write(tmp_path / f"angle.{suffix}", *angle_profile(), **options)
-    x, volume = mesh(file, 0.05)
-    # The lattice of 20³ cells fits the angle exactly: three quarters of it are inside, none in the notch.
-    assert len(x) == 6000 and volume.sum() == pytest.approx(0.75, rel=1e-6)
-    np.testing.assert_allclose(np.unique(np.round(x[:, 2], 6)), (np.arange(20) + 0.5) / 20, atol=1e-6)
-    assert not ((x[:, 0] > 0.5) & (x[:, 1] > 0.5)).any()
-
-
-@pytest.mark.parametrize("filling", FILLINGS, ids=lambda f: type(f).__name__)
-def test_every_filling_of_a_mesh(tmp_path, filling):
-    file = write(tmp_path / "angle.vtk", *angle_profile())
-    for relaxation in (None, Relaxation(sweeps=20)):
-        x, volume = mesh(file, 0.1, filling=filling, relaxation=relaxation)
-        assert volume.sum() == pytest.approx(0.75, rel=1e-12)
-        assert len(x) == pytest.approx(750, rel=0.1)
-        assert x.min() > 0.0 and x.max() < 1.0 and not ((x[:, 0] > 0.5) & (x[:, 1] > 0.5)).any()
-
-
-def test_triangles_may_all_face_inwards_and_lengths_be_millimetres(tmp_path):
-    points, triangles = angle_profile()
-    file = write(tmp_path / "inwards.vtk", 1e3 * points, triangles[:, ::-1])
-    x, volume = mesh(file, 0.1, scale=1e-3)
-    assert volume.sum() == pytest.approx(0.75, rel=1e-12) and x.max() < 1.0
-
-
-def test_tetrahedra_and_a_patch_of_gmsh(tmp_path):
-    import meshio
-
-    points, triangles = brick((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-    cut = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
-    meshio.Mesh(points, [("tetra", cut)]).write(tmp_path / "tetrahedra.vtk")
-    x, volume = mesh(tmp_path / "tetrahedra.vtk", 0.25)
-    assert len(x) == 64 and volume.sum() == pytest.approx(1.0, rel=1e-12)
-    # The first two triangles are the face x = 0, here a physical group with a name, the others a second group.
-    groups = np.array([7, 7] + [8] * 10)
-    meshio.Mesh(
-        points,
-        [("triangle", triangles)],
-        cell_data={"gmsh:physical": [groups], "gmsh:geometrical": [groups]},
-        field_data={"clamp": np.array([7, 2])},
-    ).write(tmp_path / "groups.msh", file_format="gmsh22")
-    np.testing.assert_array_equal(Patch(tmp_path / "groups.msh", 0.2, "clamp")(x), x[:, 0] < 0.25)
-    np.testing.assert_array_equal(Patch(tmp_path / "groups.msh", 0.2, "8")(x).sum(), 64 - 2 * 2 * 3)
-    assert Patch(tmp_path / "groups.msh", 0.2)(x).sum() == 64 - 8
-    with pytest.raises(ValueError, match=r"patch of the mesh must be one of \['8', 'clamp'\], got 'clmp'"):
-        Patch(tmp_path / "groups.msh", 0.2, "clmp")(x)
-
-
-def test_bad_meshes_are_named(tmp_path):
-    points, triangles = angle_profile()
-    with pytest.raises(ValueError, match=r"surface must be closed .* got 3 edges .* first at \["):
-        mesh(write(tmp_path / "open.vtk", points, triangles[1:]), 0.1)
-    turned = np.concatenate([triangles[:1, ::-1], triangles[1:]])
-    with pytest.raises(ValueError, match="turn the same way"):
-        mesh(write(tmp_path / "turned.vtk", points, turned), 0.1)
-    closed = write(tmp_path / "closed.vtk", points, triangles)
-    with pytest.raises(ValueError, match=r"too coarse|at least one cell"):
-        mesh(closed, 0.9)
-    with pytest.raises(FileNotFoundError, match=r"nowhere\.stl"):
-        mesh(tmp_path / "nowhere.stl", 0.1)
-    (tmp_path / "noise.stl").write_bytes(b"no mesh")
-    with pytest.raises(ValueError, match=r"noise\.stl: "):
-        mesh(tmp_path / "noise.stl", 0.1)
-    import meshio
-
-    meshio.Mesh(points, [("line", np.array([[0, 1]]))]).write(tmp_path / "lines.vtk")
-    with pytest.raises(ValueError, match=r"must have triangles, quadrangles or tetrahedra, got cells \['line'\]"):
-        mesh(tmp_path / "lines.vtk", 0.1)
-
-
-def test_missing_meshio_is_named(tmp_path, monkeypatch):
-    import sys
-
-    monkeypatch.setitem(sys.modules, "meshio", None)
-    with pytest.raises(ModuleNotFoundError, match=r"pip install 'warp_eulsph\[mesh\]'"):
-        mesh(tmp_path / "a.stl", 0.1)

@@ -1,4 +1,4 @@
-"""Snapshots read back bit for bit, by h5py and by VTK, and a failing disk leaves no damaged file."""
+"""Snapshots read back bit for bit by h5py (by VTK: test_vtk.py), and a failing disk leaves no damaged file."""
 
 import json
 import os
@@ -104,41 +104,6 @@ def test_bar_has_uniaxial_stress(tmp_path):
     np.testing.assert_allclose(sigma[:, 0, 0], 2e11 * (simulation.F[:, 0, 0] - 1), rtol=0, atol=1e-14 * 2e11)
     assert np.abs(sigma[:, 0, 0]).max() > 1e5
     assert not sigma[:, 1:].any() and not sigma[:, :, 1:].any()
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_vtk_reads_every_array(simulation, tmp_path, dtype):
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkIOHDF import vtkHDFReader
-
-    path = tmp_path / "a.vtkhdf"
-    write_snapshot(path, simulation, dtype=dtype)
-    snapshot = read_snapshot(path)
-    reader = vtkHDFReader()
-    reader.SetFileName(str(path))
-    reader.Update()
-    data = reader.GetOutput()
-    n = len(snapshot.x)
-    assert data.GetClassName() == "vtkPolyData"
-    assert data.GetNumberOfPoints() == n
-    points = vtk_to_numpy(data.GetPoints().GetData())
-    assert points.dtype == dtype
-    np.testing.assert_array_equal(points, pad(snapshot.x))
-    assert data.GetNumberOfVerts() == data.GetNumberOfCells() == n
-    assert [data.GetCell(k).GetPointId(0) for k in range(n)] == list(range(n))
-    for name, values in snapshot.fields.items():
-        array = vtk_to_numpy(data.GetPointData().GetArray(name))
-        np.testing.assert_array_equal(array, pad(values))
-        assert array.dtype == values.dtype
-    # Rows first: component 3 i + j is F_ij. The state is not symmetric, so a transposed order would show.
-    F = vtk_to_numpy(data.GetPointData().GetArray("deformation_gradient"))
-    d = simulation.space.dim
-    if d > 1:
-        np.testing.assert_array_equal(F[:, 1], snapshot.fields["deformation_gradient"][:, 0, 1])
-        assert (F[:, 1] != F[:, 3]).any()
-    assert data.GetPointData().GetTensors() is not None and data.GetPointData().GetVectors() is not None
-    assert data.GetFieldData().GetArray("TimeValue").GetValue(0) == simulation.t
-    assert data.GetFieldData().GetArray("Step").GetValue(0) == simulation.steps
 
 
 def test_layout_that_old_readers_need(simulation, tmp_path):

@@ -3,17 +3,30 @@
 import argparse
 from collections.abc import Sequence
 
-from .commands import bench, check, export, info, plot, resume, run, schema, validate
+from .commands import bench, check, examples, export, info, plot, resume, run, schema, validate
 
 # Each imports what it needs when it runs, so that asking for help is quick.
-COMMANDS = (run, resume, info, check, plot, export, schema, validate, bench)
+COMMANDS = (run, resume, info, check, plot, export, examples, schema, validate, bench)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand; its exit status."""
-    parser = argparse.ArgumentParser(prog="warp-eulsph", description="Eulerian corrected SPH on NVIDIA Warp.")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    parser = argparse.ArgumentParser(
+        prog="warp-eulsph",
+        description="Eulerian corrected SPH on NVIDIA Warp. Each command has a --help of its own.",
+        epilog="To begin with: warp-eulsph examples; warp-eulsph run example:punch; warp-eulsph plot runs/punch.",
+    )
+    parser.add_argument("--version", action="store_true", help="print versions and end")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     for command in COMMANDS:
         command.add(commands)
     arguments = parser.parse_args(argv)
+    if arguments.version:
+        from importlib import metadata
+
+        print(" ".join(f"{name} {metadata.version(name)}" for name in ("warp-eulsph", "warp-lang")))
+        return 0
+    if not hasattr(arguments, "run_command"):
+        parser.print_help()
+        return 2
     return arguments.run_command(arguments)

@@ -53,7 +53,7 @@ def available(device: Any) -> int | None:
 def check_memory(space: Space, n: int, reach: float, moving: bool, device: Any) -> None:
     """Log what ``n`` particles will take; raise MemoryError if that is more than there is."""
     each, there = bytes_per_particle(space, reach, moving, device), available(device)
-    log.info("%d particles take about %.0f bytes each, %.3g GB", n, each, n * each / 1e9)
+    log.info("%d particles take about %.0f bytes each, %.3g MB", n, each, n * each / 1e6)
     if there is not None and n * each > there:
         raise MemoryError(
             f"{n} particles take about {each:.0f} bytes each, {n * each / 1e9:.3g} GB, and {there / 1e9:.3g} GB are "

@@ -181,16 +181,8 @@ class Simulation:
         Raises:
             ValueError: names or shapes that are not those of this simulation; nothing was changed.
         """
-        own = self.evolving()
-        shapes = {name: array.numpy().shape for name, array in own.items()}
-        given = {name: array.shape for name, array in arrays.items()}
-        wrong = sorted(name for name in shapes.keys() | given.keys() if shapes.get(name) != given.get(name))
-        if wrong or counters.keys() != self.counters.keys():
-            raise ValueError(
-                f"restore: arrays must have names and shapes of this simulation, {wrong[0] if wrong else 'counters'} "
-                f"differs: {given.get(wrong[0]) if wrong else set(counters)}; build the simulation as it was"
-            )
-        for name, array in own.items():
+        check_restorable(self, arrays, counters)
+        for name, array in self.evolving().items():
             array.assign(arrays[name])
         self.stepper.steps = int(counters["steps"])
         self.stepper.ledger.start, self._longest_dt = counters["start"], counters["longest_dt"]
@@ -212,6 +204,16 @@ class Simulation:
     def steps(self) -> int:
         """Steps taken."""
         return self.stepper.steps
+
+    @property
+    def configuration(self) -> Configuration:
+        """The configuration in which weights live now."""
+        return self.stepper.configuration
+
+    @property
+    def X(self) -> np.ndarray:
+        """Initial positions [m], (n, dim)."""
+        return np.concatenate([body.x for body in self.bodies])
 
     @property
     def x(self) -> np.ndarray:
@@ -334,6 +336,18 @@ class Simulation:
             particle,
             self.t,
             self.steps,
+        )
+
+
+def check_restorable(simulation: Any, arrays: Mapping[str, np.ndarray], counters: Mapping[str, float]) -> None:
+    """ValueError unless names and shapes are those of ``evolving`` and ``counters`` of this ``simulation``."""
+    shapes = {name: array.numpy().shape for name, array in simulation.evolving().items()}
+    given = {name: array.shape for name, array in arrays.items()}
+    wrong = sorted(name for name in shapes.keys() | given.keys() if shapes.get(name) != given.get(name))
+    if wrong or counters.keys() != simulation.counters.keys():
+        raise ValueError(
+            f"restore: arrays must have names and shapes of this simulation, {wrong[0] if wrong else 'counters'} "
+            f"differs: {given.get(wrong[0]) if wrong else set(counters)}; build the simulation as it was"
         )
 
 

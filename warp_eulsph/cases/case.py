@@ -1,34 +1,25 @@
 """The case: the schema of a case file, and what it builds."""
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
-import warp as wp
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from .. import geometry
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..materials import Material
-from ..output import FIELDS, Probe, Recording
-from ..schedule import AnyOf, AtTimes, EverySteps, EveryTime, Schedule
+from ..output import FIELDS, Probe
 from ..scheme.lax import Lax
 from ..scheme.lax_wendroff import LaxWendroff
 from ..scheme.reference import ReferencePolicy
 from ..scheme.time_step import TimeStep
 from ..scheme.verlet import Verlet
 from ..simulation import Body, Simulation
-from ..space import Space
-from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, Zone, choice, made, one_of
-from .values import Formula, Number, PlaceFormula, Whole
-
-#: The shapes of ``geometry``: its functions.
-SHAPES = tuple(getattr(geometry, name) for name in geometry.__all__ if not isinstance(getattr(geometry, name), type))
-PRECISIONS = {"double": wp.float64, "single": wp.float32}
-Precision = Literal["double", "single"]
+from .options import Table, choice, one_of
+from .problem import PRECISIONS, OutputTable, Problem
+from .shapes import SHAPES, dimension, particles
+from .values import Formula, Number, PlaceFormula
 
 
 class MirrorPlane(Table):
@@ -57,17 +48,11 @@ class BodyTable(Table):
     @property
     def dim(self) -> int:
         """Dimension, by the first point of the shape; meshes are in 3-D."""
-        points = [value for _, value in self.shape if isinstance(value, list)]
-        return len(points[0]) if points else 3
+        return dimension(self.shape)
 
     def build(self, name: str) -> Body:
         """The body, without ghosts."""
-        try:
-            x, volume, *given = self.shape.make()
-        except ValueError as error:
-            raise ValueError(f"body.{name}.shape: {error}") from None
-        except MemoryError:
-            raise ValueError(f"body.{name}.shape: it does not fit into memory; increase the spacing") from None
+        x, volume, *given = particles(self.shape, f"body.{name}.shape")
         surface = given[0] if given else None
         return Body(
             x=x,
@@ -80,53 +65,27 @@ class BodyTable(Table):
         )
 
 
-class OutputTable(Table):
-    """What a run writes, and when."""
+class SolidsOutput(OutputTable):
+    """What a run of solids writes, and when."""
 
-    every: Number | None = Field(None, gt=0.0, description="time between snapshots [s]")
-    steps: Whole | None = Field(None, gt=0, description="steps between snapshots")
-    at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
+    held = FIELDS
+
     fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
-    precision: Precision = Field("single", description="of the stored numbers")
-    region: Zone | None = Field(None, description="particles in the snapshots, by initial positions; all by default")
     body: str | None = Field(None, description="body whose particles are in the snapshots, any by default")
-    log: choice(Schedule) = Field({"kind": "EverySteps", "count": 16}, validate_default=True)  # type: ignore[valid-type]
-    checkpoint: Number = Field(600.0, gt=0.0, description="wall time between checkpoints [s]")
-
-    @field_validator("fields")
-    @classmethod
-    def _known(cls, fields: list[str] | None) -> list[str] | None:
-        for name in fields or []:
-            if name not in FIELDS:
-                raise ValueError(f"unknown field {name!r}{nearest(name, FIELDS)}; known are {list(FIELDS)}")
-        return fields
-
-    @field_validator("at")
-    @classmethod
-    def _in_order(cls, at: list[float]) -> list[float]:
-        return list(AtTimes(at).times)
 
 
-class Case(Table):
-    """A whole problem; SI units throughout, plane strain in 2-D and uniaxial strain in 1-D.
+class Case(Problem):
+    """A problem of solids; SI units throughout, plane strain in 2-D and uniaxial strain in 1-D.
 
     Numbers may be formulas of ``parameters``; regions, velocities and loads may be formulas of place and time.
     """
 
-    title: str = Field("", description="what is solved, in one line")
-    until: Number = Field(gt=0.0, description="end time [s]")
-    parameters: dict[str, Number] = Field({}, description="numbers that formulas may use by name, or formulas of those")
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
     boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
-    weight: choice(Weight) = Field("CubicSpline", validate_default=True)  # type: ignore[valid-type]
-    dilation: Number = Field(1.3, gt=0.0, description="smoothing length over spacing")
-    periodic: list[Number] | None = Field(None, description="lengths [m] of a periodic box at the origin; 0 is open")
-    precision: Precision = Field("double", description="of the simulation")
-    device: str | None = Field(None, description="Warp device such as cuda:0; Warp's default otherwise")
-    output: OutputTable = Field({}, validate_default=True)  # type: ignore[arg-type]
+    output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     probe: list[choice(Probe)] = Field([], description="what goes to tables of its own; boundary counts from 0")  # type: ignore
 
     @property
@@ -134,19 +93,8 @@ class Case(Table):
         """Dimension of the first body."""
         return next(iter(self.body.values())).dim
 
-    @property
-    def space(self) -> Space:
-        """Dimension and precision."""
-        return Space(self.dim, PRECISIONS[self.precision], self.periodic is not None)
-
     def build(self) -> Simulation:
-        """The simulation at its start.
-
-        Raises:
-            ValueError: as ``Simulation`` and the geometry say, particles or regions that do not fit together.
-            ModuleNotFoundError: a mesh without meshio.
-            OSError: a mesh file that is not there.
-        """
+        """The simulation at its start; raises as ``Problem.build``."""
         bodies, ghosts = [], []
         weight, space = self.weight.make(), self.space
         for name, table in self.body.items():
@@ -174,39 +122,15 @@ class Case(Table):
             device=self.device,
         )
 
-    def recording(self, simulation: Simulation) -> Recording:
-        """What a run of this simulation keeps.
-
-        Raises:
-            ValueError: probes of equal names.
-        """
-        output = self.output
-        snapshots: list[Schedule] = [AtTimes(output.at)]
-        snapshots += [EveryTime(output.every)] if output.every is not None else []
-        snapshots += [EverySteps(output.steps)] if output.steps is not None else []
+    def particular(self, simulation: Simulation) -> dict[str, Any]:
+        """The body whose particles snapshots hold, and probes."""
         probes = []
         for table in self.probe:
             arguments = table.arguments()
             if "boundary" in arguments:
                 arguments["boundary"] = simulation.boundaries[arguments["boundary"]]
             probes.append(table.target(**arguments))
-        return Recording(
-            snapshots=AnyOf(snapshots),
-            fields=output.fields,
-            dtype=np.float64 if output.precision == "double" else np.float32,
-            region=made(output.region, self.space, "region"),
-            body=output.body,
-            log=output.log.make(),
-            probes=probes,
-            checkpoint=output.checkpoint,
-        )
-
-    def describe(self) -> dict[str, Any]:
-        """The full case with its defaults, formulas of parameters worked out; JSON and TOML can hold it.
-
-        ``parse_case`` of it gives the same case.
-        """
-        return self.model_dump(mode="json", exclude_none=True)
+        return {"body": self.output.body, "probes": probes}
 
     @model_validator(mode="after")
     def _agree(self) -> "Case":

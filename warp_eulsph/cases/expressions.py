@@ -84,26 +84,34 @@ class Expression:
     Attributes:
         text: as written.
         tree: its parsed form.
-        names: variables in it.
+        names: variables in it, those of the definitions it uses too.
+        definitions: the formulas that it uses by name, each before those that use it.
     """
 
     text: str
     tree: ast.expr
     names: frozenset[str]
+    definitions: tuple[tuple[str, "Expression"], ...] = ()
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """Its value on the host; ``values`` are numbers or arrays by name."""
+        known = dict(values)
         with np.errstate(all="ignore"):
-            return _evaluate(self.tree, values)
+            for name, definition in self.definitions:
+                known[name] = _evaluate(definition.tree, known)
+            return _evaluate(self.tree, known)
 
 
-def parse(text: str, names: Sequence[str], *, truth: bool = False) -> Expression:
+def parse(
+    text: str, names: Sequence[str], *, truth: bool = False, definitions: Mapping[str, Expression] = {}
+) -> Expression:
     """Check a formula.
 
     Args:
         text: the formula.
         names: variables it may use.
         truth: it must say yes or no, as a region does, instead of giving a number.
+        definitions: formulas that it may use by name, those of other variables than ``names`` aside.
 
     Raises:
         ValueError: not a formula, an unknown name or function, or a number where a truth is asked for.
@@ -113,14 +121,23 @@ def parse(text: str, names: Sequence[str], *, truth: bool = False) -> Expression
     try:
         tree = ast.parse(text.strip(), mode="eval").body
         found: set[str] = set()
-        is_truth = _check(tree, tuple(names), found)
+        usable = {name: d for name, d in definitions.items() if d.names <= {*names, "pi"}}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and node.id in definitions.keys() - usable.keys():
+                strange = sorted(definitions[node.id].names - {*names, "pi"})
+                raise ValueError(f"{node.id!r} depends on {strange}, which formulas in this place must not")
+        is_truth = _check(tree, (*names, *usable), found)
     except (SyntaxError, RecursionError, MemoryError) as error:
         reason = error.msg if isinstance(error, SyntaxError) else "too deeply nested"
         raise ValueError(f"not a formula: {text!r} ({reason})") from None
     if is_truth != truth:
         wanted, got = ("a comparison such as 'y < 0.1'", "a number") if truth else ("a number", "a comparison")
         raise ValueError(f"must be {wanted}, got {got}: {text!r}")
-    return Expression(text, tree, frozenset(found))
+    # Those that it uses, and that those use; in their own order, in which none comes before what it uses.
+    used = {name for name in found if name in usable}
+    used |= {inner for name in used for inner, _ in usable[name].definitions}
+    names_in = found.union(*(usable[name].names for name in used)) - used
+    return Expression(text, tree, frozenset(names_in), tuple((name, usable[name]) for name in usable if name in used))
 
 
 def _check(node: ast.AST, names: tuple[str, ...], found: set[str]) -> bool:
@@ -206,15 +223,16 @@ def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> Any:
     raise AssertionError(ast.dump(node))
 
 
-def _source(node: ast.AST, values: Mapping[str, float]) -> str:
-    """Warp's source of a node; ``values`` are the variables that are constants."""
+def _source(node: ast.AST, values: Mapping[str, Any]) -> str:
+    """Warp's source of a node; ``values`` are numbers, and the local variables of definitions, by name."""
     match node:
         case ast.Constant(value=value):
             return f"real({float(value)!r})"  # type: ignore[arg-type]
         case ast.Name(id=name):
             if name in COORDINATES:
                 return f"x[{COORDINATES.index(name)}]"
-            return "t" if name == "t" else f"real({np.pi if name == 'pi' else float(values[name])!r})"
+            value = np.pi if name == "pi" else "t" if name == "t" else values[name]
+            return value if isinstance(value, str) else f"real({float(value)!r})"
         case ast.UnaryOp(op=op, operand=operand):
             sign = "not " if isinstance(op, ast.Not) else "-" if isinstance(op, ast.USub) else "+"
             return f"({sign}{_source(operand, values)})"
@@ -236,12 +254,22 @@ def _source(node: ast.AST, values: Mapping[str, float]) -> str:
 
 def device_function(expressions: Sequence[Expression], values: Mapping[str, float], space: Space) -> Any:
     """``wp.func`` (x, t) -> row of the formulas, in the precision of ``space``; ``values`` are constants by name."""
-    return _compiled(tuple(_source(expression.tree, values) for expression in expressions), space)
+    known: dict[str, Any] = dict(values)
+    lines: list[str] = []
+    for expression in expressions:
+        for name, definition in expression.definitions:
+            if name not in known:
+                known[name] = f"d{len(lines)}"
+                lines.append(f"{known[name]} = {_source(definition.tree, known)}")
+    return _compiled(tuple(lines), tuple(_source(expression.tree, known) for expression in expressions), space)
 
 
 @functools.cache
-def _compiled(parts: tuple[str, ...], space: Space) -> Any:
-    """``wp.func`` of Warp's source of each component; cached, because a new function is a new kernel."""
+def _compiled(lines: tuple[str, ...], parts: tuple[str, ...], space: Space) -> Any:
+    """``wp.func`` of Warp's source: lines that come first, and each component.
+
+    Cached, because a new function is a new kernel.
+    """
     real = space.real
 
     @wp.func
@@ -253,7 +281,8 @@ def _compiled(parts: tuple[str, ...], space: Space) -> Any:
     def sign(s: real) -> real:
         return wp.where(s == real(0.0), real(0.0), wp.sign(s))
 
-    source = f"def formula(x: vec, t: real):\n    return row({', '.join(parts)})\n"
+    body = "".join(f"    {line}\n" for line in (*lines, f"return row({', '.join(parts)})"))
+    source = f"def formula(x: vec, t: real):\n{body}"
     # Warp reads the source of a function by its file: this one is only in the cache of files.
     file = f"<formula {source!r} {space!r}>"
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)

@@ -215,10 +215,15 @@ class _Name:
 
 
 def concrete(base: type) -> list[type]:
-    """The classes of the package below ``base`` that can be made, by name; ``base`` itself when it has none."""
-    package = importlib.import_module(base.__module__.rpartition(".")[0])
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{package.__name__}.{module.name}")
+    """The classes of the package below ``base`` that can be made, by name; ``base`` itself when it has none.
+
+    They lie in its own file, or one to a file beside it: those files are imported then.
+    """
+    direct: list[type] = base.__subclasses__()
+    if inspect.isabstract(base) and all(cls.__module__ != base.__module__ for cls in direct):
+        package = importlib.import_module(base.__module__.rpartition(".")[0])
+        for module in pkgutil.iter_modules(package.__path__):
+            importlib.import_module(f"{package.__name__}.{module.name}")
     below, todo = set(), [base]
     while todo:
         cls = todo.pop()

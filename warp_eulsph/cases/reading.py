@@ -8,10 +8,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from .case import Case
-from .expressions import COORDINATES, FUNCTIONS, nearest
+from .expressions import COORDINATES, FUNCTIONS, Expression, nearest, parse
+from .transport import TransportCase
 from .values import Reading, number
 
 if sys.version_info >= (3, 11):
@@ -32,8 +33,8 @@ class CaseError(ValueError):
         super().__init__("\n".join([f"{source}: {len(self.problems)} problem{'s' * (len(problems) > 1)}", *problems]))
 
 
-def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case:
-    """The case of a TOML file.
+def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case | TransportCase:
+    """The case of a TOML file: of solids, or of a transported quantity where it has a table ``transport``.
 
     Args:
         path: the file; paths in it start from its directory.
@@ -55,8 +56,8 @@ def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case:
     return parse_case(data, directory=Path(path).parent, source=source)
 
 
-def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source: str = "case") -> Case:
-    """The case of a table such as TOML gives, or ``Case.describe``.
+def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source: str = "case") -> Case | TransportCase:
+    """The case of a table such as TOML gives, or ``describe`` of a case.
 
     Args:
         data: the table; it is left as it is.
@@ -68,11 +69,13 @@ def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source:
     """
     data = copy.deepcopy(data)
     parameters, problems = _parameters(data.get("parameters"))
-    context = Reading(parameters, Path(directory))
+    definitions, wrong = _definitions(data.get("definitions"), parameters)
+    problems += wrong
+    context = Reading(parameters, definitions, Path(directory))
     if isinstance(data.get("parameters"), dict):
         data["parameters"] = dict(parameters)
     try:
-        case = Case.model_validate(data, context=context)
+        case = (TransportCase if "transport" in data else Case).model_validate(data, context=context)
     except ValidationError as error:
         problems += _explained(error, data, context)
     if problems:
@@ -82,7 +85,8 @@ def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source:
 
 def json_schema() -> dict[str, Any]:
     """The schema of case files as JSON Schema, for editors."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Case.model_json_schema()}
+    schema = TypeAdapter(Case | TransportCase).json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def _load(text: str, source: str) -> dict[str, Any]:
@@ -104,6 +108,9 @@ def _override(data: dict[str, Any], override: str) -> str | None:
         value = tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):
         value = text.strip()
+    parameters = data.get("parameters")
+    if len(keys) == 1 and isinstance(parameters, dict) and keys[0] in parameters:
+        return f"override {override!r}: {keys[0]!r} is a parameter; write parameters.{override.strip()}"
     place: Any = data
     for depth, key in enumerate(keys):
         if isinstance(place, list):
@@ -125,8 +132,8 @@ def _parameters(given: Any) -> tuple[dict[str, float], list[str]]:
     problems: list[str] = []
     for name, value in given.items() if isinstance(given, dict) else ():
         path = f"parameters.{name}"
-        if not name.isidentifier() or keyword.iskeyword(name) or name in (*COORDINATES, "t", "pi", *FUNCTIONS):
-            problems.append(f"{path}: must be named by letters, digits and _, and not like a coordinate or function")
+        if not _can_be_named(name):
+            problems.append(f"{path}: {_NAMES}")
         elif isinstance(value, str):
             try:
                 parameters[name] = number(value, parameters)
@@ -139,6 +146,33 @@ def _parameters(given: Any) -> tuple[dict[str, float], list[str]]:
         if name.isidentifier() and name not in COORDINATES:
             parameters.setdefault(name, 1.0)  # so that formulas with a wrong one are not wrong too
     return parameters, problems
+
+
+def _definitions(given: Any, parameters: dict[str, float]) -> tuple[dict[str, Expression], list[str]]:
+    """The definitions that make sense, in their order, and what is wrong with the others."""
+    definitions: dict[str, Expression] = {}
+    problems: list[str] = []
+    for name, value in given.items() if isinstance(given, dict) else ():
+        path = f"definitions.{name}"
+        try:
+            if not _can_be_named(name):
+                raise ValueError(_NAMES)
+            if name in parameters:
+                raise ValueError("is the name of a parameter, too")
+            if not isinstance(value, str):
+                raise ValueError(f"must be a formula as text, got {value!r}; numbers are parameters")
+            definitions[name] = parse(value, [*COORDINATES, "t", *parameters], definitions=definitions)
+        except ValueError as error:
+            problems.append(f"{path}: {error}")
+            definitions.setdefault(name, parse("1", []))  # so that formulas with a wrong one are not wrong too
+    return definitions, problems
+
+
+_NAMES = "must be named by letters, digits and _, and not like a coordinate or function"
+
+
+def _can_be_named(name: str) -> bool:
+    return name.isidentifier() and not keyword.iskeyword(name) and name not in (*COORDINATES, "t", "pi", *FUNCTIONS)
 
 
 def _explained(error: ValidationError, data: Any, context: Reading) -> list[str]:

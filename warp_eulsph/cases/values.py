@@ -18,11 +18,13 @@ class Reading:
 
     Attributes:
         parameters: numbers by name that formulas may use.
+        definitions: formulas of place and time by name that formulas may use.
         directory: of the case file, which paths start from.
         keys: id of a table as it was read -> the keys that it may have, noted for messages.
     """
 
     parameters: dict[str, float] = field(default_factory=dict)
+    definitions: dict[str, Expression] = field(default_factory=dict)
     directory: Path = Path(".")
     keys: dict[int, list[str]] = field(default_factory=dict)
 
@@ -76,13 +78,13 @@ class Formula:
 
     @property
     def names(self) -> frozenset[str]:
-        """Variables in it."""
+        """Variables in it, those of the definitions it uses too."""
         return frozenset().union(*(part.names for part in self.parts))
 
-    def at(self, X: np.ndarray) -> np.ndarray:
-        """Values at positions X [m], (n, dim): (n, number of parts)."""
+    def at(self, X: np.ndarray, t: float = 0.0) -> np.ndarray:
+        """Values at positions X [m], (n, dim), and time ``t`` [s]: (n, number of parts)."""
         places = dict(zip(COORDINATES, X.T, strict=False))
-        values = [part({**self.parameters, **places}) for part in self.parts]
+        values = [part({**self.parameters, **places, "t": t}) for part in self.parts]
         return np.stack([np.broadcast_to(value, len(X)) for value in values], axis=1)
 
     def condition(self, space: Any, *, always_function: bool = False) -> Any:
@@ -97,12 +99,12 @@ def _formula(*variables: str, truth: bool = False) -> Callable[[Any, ValidationI
     def validate(given: Any, info: ValidationInfo) -> Formula:
         if isinstance(given, Formula):
             return given
-        parameters = reading(info).parameters
+        parameters, definitions = reading(info).parameters, reading(info).definitions
         names = [*variables, *parameters]
         if truth:
             if not isinstance(given, str):
                 raise ValueError(f"must be a comparison such as 'y < 0.1', got {given!r}")
-            return Formula(given, (parse(given, names, truth=True),), parameters)
+            return Formula(given, (parse(given, names, truth=True, definitions=definitions),), parameters)
         parts = given if isinstance(given, list) else [given]
         if len(parts) not in (1, 2, 3):
             raise ValueError(f"must have 1, 2 or 3 components, got {len(parts)}")
@@ -110,7 +112,7 @@ def _formula(*variables: str, truth: bool = False) -> Callable[[Any, ValidationI
             if isinstance(part, bool) or not isinstance(part, (int, float, str)):
                 raise ValueError(f"must be a number, a formula or a list of them, got {part!r}")
         texts = [part if isinstance(part, str) else repr(part) for part in parts]
-        return Formula(given, tuple(parse(text, names) for text in texts), parameters)
+        return Formula(given, tuple(parse(text, names, definitions=definitions) for text in texts), parameters)
 
     return validate
 

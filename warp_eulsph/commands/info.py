@@ -35,6 +35,29 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+#: Columns of the log that are shown: key, name, unit.
+LOGGED = (
+    ("total", "energy", " J"),
+    ("least", "least value", ""),
+    ("largest", "largest", ""),
+    ("error", "L2 error", ""),
+)
+
+
+def _said(simulation: dict[str, Any]) -> list[tuple[str, str]]:
+    """What is run: bodies and scheme, or what is carried along."""
+    kind, scheme = f"{simulation['dimension']}-D, {simulation['dtype']}", simulation["scheme"]["type"]
+    if "flux" in simulation:
+        flux = simulation["flux"]
+        law = f"velocity {flux['velocity']} m/s" if "velocity" in flux else str(flux.get("function"))
+        return [("transport", f"{law}, {kind}"), ("scheme", scheme)]
+    bodies = [f"{name} ({body['material']['type']})" for name, body in simulation["bodies"].items()]
+    return [
+        ("bodies", f"{', '.join(bodies)}, {kind}"),
+        ("scheme", f"{scheme}, reference {simulation['reference']['type']}"),
+    ]
+
+
 def lines(found: Any) -> list[tuple[str, str]]:
     """What is said of a run: (name, text)."""
     from ..output.checkpoint import Checkpoints
@@ -45,9 +68,7 @@ def lines(found: Any) -> list[tuple[str, str]]:
     if source is not None:
         shown.append(("case", " ".join([source, *found.description["case"]["overrides"]])))
     if simulation:
-        bodies = [f"{name} ({body['material']['type']})" for name, body in simulation["bodies"].items()]
-        shown.append(("bodies", f"{', '.join(bodies)}, {simulation['dimension']}-D, {simulation['dtype']}"))
-        shown.append(("scheme", f"{simulation['scheme']['type']}, reference {simulation['reference']['type']}"))
+        shown += _said(simulation)
     if status:
         reason = f": {status['reason']}" if status["reason"] else ""
         shown.append(("state", f"{found.state}{reason}"))
@@ -58,8 +79,8 @@ def lines(found: Any) -> list[tuple[str, str]]:
         shown.append(("fields", ", ".join(found.fields)))
     log = found.log
     if log:
-        energy = log["total"][-1]
-        shown.append(("log", f"step {log['step'][-1]}, t = {log['t'][-1]:.8g} s, energy {energy:.6g} J"))
+        figures = [f"{name} {log[key][-1]:.6g}{unit}" for key, name, unit in LOGGED if key in log]
+        shown.append(("log", f"step {log['step'][-1]}, t = {log['t'][-1]:.8g} s, {', '.join(figures)}"))
     if found.probe_names:
         shown.append(("probes", ", ".join(found.probe_names)))
     names = [path.stem.lstrip("0") or "0" for path in Checkpoints(found.directory.checkpoints).paths()]

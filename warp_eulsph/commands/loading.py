@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any
 
 from ..output import Recording
-from ..simulation import Simulation
+from ..output.fields import Recorded
 
 EXAMPLE = "example:"
 
@@ -23,17 +23,19 @@ class LoadedCase:
 
     Attributes:
         name: for a directory.
-        build: the simulation at its start.
+        build: what is run, at its start.
         until: end time [s].
         recording: what its run keeps.
-        origin: where it came from, for ``run.json``: source, overrides, text of the file, all its settings.
+        origin: where it came from, for ``run.json``: source, overrides, all its settings.
+        files: what builds it again, for the directory of its run: text by name.
     """
 
     name: str
-    build: Callable[[], Simulation]
+    build: Callable[[], Recorded]
     until: float
-    recording: Callable[[Simulation], Recording]
+    recording: Callable[[Any], Recording]
     origin: dict[str, Any]
+    files: dict[str, str]
 
 
 def load_case(source: str, overrides: Sequence[str] = (), device: str | None = None) -> LoadedCase:
@@ -47,21 +49,21 @@ def load_case(source: str, overrides: Sequence[str] = (), device: str | None = N
     Raises:
         ValueError: no such file or example, or one that is wrong; it says what.
     """
-    path = _path(source)
+    path = example_path(source.removeprefix(EXAMPLE)) if source.startswith(EXAMPLE) else Path(source)
     if not path.is_file():
-        raise ValueError(f"no case file {path}")
+        hint = f"; the example of that name is {EXAMPLE}{path.stem}" if path.stem in examples() else ""
+        raise ValueError(f"no case file {path}{hint}")
     load = {".toml": _load_toml, ".py": _load_python}.get(path.suffix)
     if load is None:
         raise ValueError(f"a case must be a .toml file, a .py file or {EXAMPLE}NAME, got {source!r}")
-    build, until, recording, settings = load(path, overrides, device)
+    build, until, recording, settings, text = load(path, overrides, device)
     origin = {
         "source": source if source.startswith(EXAMPLE) else str(path.resolve()),
         "overrides": list(overrides),
         "device": device,
-        "text": path.read_text(encoding="utf-8"),
         "settings": settings,
     }
-    return LoadedCase(path.stem, build, until, recording, origin)
+    return LoadedCase(path.stem, build, until, recording, origin, {f"case{path.suffix}": text})
 
 
 def examples() -> dict[str, Path]:
@@ -73,31 +75,38 @@ def examples() -> dict[str, Path]:
     return {}
 
 
-def _path(source: str) -> Path:
-    if not source.startswith(EXAMPLE):
-        return Path(source)
-    name, known = source.removeprefix(EXAMPLE), examples()
+def example_path(name: str) -> Path:
+    """The case file of an example.
+
+    Raises:
+        ValueError: no such example; it names those that there are.
+    """
+    known = examples()
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"unknown example {name!r}{hint} Examples: {', '.join(known) or 'none are installed'}")
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise ValueError(f"unknown example {name!r}; {hint}examples are {', '.join(known) or 'not installed'}")
     return known[name]
 
 
 def _load_toml(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
+    import tomli_w
+
     from ..cases import read_case
 
     case = read_case(path, [*overrides, *([f"device={device}"] if device else [])])
-    return case.build, case.until, case.recording, case.describe()
+    described = case.describe()
+    text = f"# {path.name} with its defaults and settings, as it was run. SI units.\n{tomli_w.dumps(described)}"
+    return case.build, case.until, case.recording, described, text
 
 
 def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
-    module = _module(path)
+    module, text = _module(path), path.read_text(encoding="utf-8")
     case: Any = getattr(module, "CASE", None)
     if hasattr(case, "build"):
         if overrides:
             raise ValueError(f"{path} defines CASE, which takes no settings, got {list(overrides)}")
-        return _on(device, case.build), case.until, case.recording, case.describe()
+        return _on(device, case.build), case.until, case.recording, case.describe(), text
     settings = dict(_setting(override) for override in overrides)
     build, until = getattr(module, "build", None), getattr(module, "UNTIL", None)
     if not callable(build) or not isinstance(until, int | float):
@@ -111,15 +120,15 @@ def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tu
             raise ValueError(f"{path}: build has no setting {wrong[0]!r}; it has {list(known) or 'none'}")
 
     given = getattr(module, "recording", lambda simulation: Recording())
-    return _on(device, lambda: build(**settings)), float(until), given, settings
+    return _on(device, lambda: build(**settings)), float(until), given, settings, text
 
 
-def _on(device: str | None, build: Callable[[], Simulation]) -> Callable[[], Simulation]:
+def _on(device: str | None, build: Callable[[], Recorded]) -> Callable[[], Recorded]:
     """``build`` where ``device`` is Warp's default device."""
     if device is None:
         return build
 
-    def made() -> Simulation:
+    def made() -> Recorded:
         import warp as wp
 
         with wp.ScopedDevice(device):

@@ -19,16 +19,17 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "-f",
         "--field",
-        default="velocity",
         help="what colours the particles: a field, the length of a vector, velocity.x, cauchy_stress.xy or von_mises; "
-        "default %(default)s",
+        "default velocity, or the first field that there is",
     )
     parser.add_argument("--frames", metavar="WHICH", help="such as -1, 0,5,10 or ::2; default -1 for a PNG, else all")
     parser.add_argument(
         "--limits", type=_numbers(2), metavar="LOW,HIGH", help="range of the colours; default all of it"
     )
     parser.add_argument("--colours", default="viridis", help="colour map of matplotlib; default %(default)s")
-    parser.add_argument("--size", type=_numbers(2, int), default=(1000, 700), metavar="W,H", help="pixels")
+    parser.add_argument(
+        "--size", type=_numbers(2, int), default=(1000, 700), metavar="W,H", help="pixels; default 1000,700"
+    )
     parser.add_argument("--view", type=_numbers(3), metavar="X,Y,Z", help="where 3-D is looked at from; y points up")
     parser.add_argument("--fps", type=float, default=10.0, help="frames per second of a film; default %(default)s")
     parser.set_defaults(run_command=run)
@@ -37,18 +38,20 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw; 0, or 2 when it cannot be."""
     from ..output import Run
-    from ..pictures import Picture, film, picture
+    from ..pictures import Picture, default_field, film, picture
     from ..pictures.cells import spacing
 
     try:
         single = arguments.output.endswith(".png")
+        if not arguments.output.endswith((".png", ".gif", ".mp4")):
+            raise ValueError(f"the ending must be .png, .gif or .mp4, got {arguments.output!r}")
         found = Run(arguments.directory)
         frames = chosen(len(found), arguments.frames or ("-1" if single else ":"))
         if single and len(frames) > 1:
             raise ValueError(f"a PNG shows one frame, --frames {arguments.frames} are {len(frames)}; choose a .gif")
         view = {} if arguments.view is None else {"view": arguments.view}
         options = Picture(
-            field=arguments.field,
+            field=arguments.field or default_field(found[0]),
             size=arguments.size,
             colours=arguments.colours,
             limits=arguments.limits,

@@ -43,21 +43,20 @@ def run(arguments: argparse.Namespace) -> int:
                 "record(simulation, directory, until, recording, resume=True)"
             )
         device = origin["device"] if arguments.device is None else arguments.device
-        case = load_case(_source(home.path, origin), origin["overrides"], device)
+        case = load_case(*_source(home.path, origin), device)
     except (ValueError, OSError) as error:
         return complain(error, BAD_INPUT)
     until = kept["until"] if arguments.until is None else arguments.until
     return carry_out(case, home.path, until, arguments.max_wall, resume=True, force=arguments.force, replace=False)
 
 
-def _source(directory: Path, origin: dict[str, Any]) -> str:
-    """Where the case came from, or the copy that the run kept when that is gone."""
+def _source(directory: Path, origin: dict[str, Any]) -> tuple[str, list[str]]:
+    """The case and its settings: where they came from, or what the run kept of them when that is gone."""
     from .loading import EXAMPLE
 
     source = origin["source"]
     if source.startswith(EXAMPLE) or Path(source).exists():
-        return source
+        return source, origin["overrides"]
     copy = directory / f"case{Path(source).suffix}"
-    copy.write_text(origin["text"], encoding="utf-8")
-    log.warning("%s is gone; using what run.json kept of it, in %s", source, copy)
-    return str(copy)
+    log.warning("%s is gone; using %s", source, copy)
+    return str(copy), [] if copy.suffix == ".toml" else origin["overrides"]  # which has them in it

@@ -31,8 +31,10 @@ def carry_out(
     try:
         simulation = case.build()
         recording: Recording = case.recording(simulation)
-        log.info("%s: %d particles on %s", case.name, len(simulation.stepper.U.x), simulation.device)
-        stop = Stop(wall=wall, file=RunDirectory(directory).stop)
+        log.info("%s: %d particles on %s", case.name, len(simulation.particles.mass), simulation.device)
+        home = RunDirectory(directory)
+        before = home.read(home.status).get("step") if resume else None
+        stop = Stop(wall=wall, file=home.stop)
         with stop, Progress(until) as progress, logging_redirect_tqdm():
             outcome = record(
                 simulation,
@@ -43,6 +45,7 @@ def carry_out(
                 force=force,
                 replace=replace,
                 case=case.origin,
+                files=case.files,
                 stop=stop,
                 watch=progress,
             )
@@ -61,7 +64,10 @@ def carry_out(
             directory,
         )
         return STOPPED
+    home.stop.unlink(missing_ok=True)  # asked for too late
     log.info("done: step %d, t = %.8g s, in %s", outcome.step, outcome.time, directory)
+    if outcome.step == before:
+        log.info("there was nothing left to do; --until takes the run on to a later time")
     return DONE
 
 

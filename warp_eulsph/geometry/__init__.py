@@ -1,8 +1,10 @@
 """Shapes as particles."""
 
+from .annulus import annulus
 from .filling import BodyCentred, Filling, Lattice, Staggered
 from .lattice import box, nodes
 from .mesh import Patch, mesh
+from .outline import outline
 from .relaxation import Relaxation
 from .shapes import cylinder, disc, ring, sphere, tube
 
@@ -13,11 +15,13 @@ __all__ = [
     "Patch",
     "Relaxation",
     "Staggered",
+    "annulus",
     "box",
     "cylinder",
     "disc",
     "mesh",
     "nodes",
+    "outline",
     "ring",
     "sphere",
     "tube",

@@ -6,6 +6,7 @@ from os import PathLike
 import numpy as np
 
 from .filling import Filling, Lattice
+from .outline import read_outline
 from .relaxation import Relaxation
 from .solid import Solid
 from .surface import Surface, read_surface
@@ -47,16 +48,17 @@ def mesh(
     lower, upper = surface.points.min(axis=0), surface.points.max(axis=0)
     if not volume > 1e-9 * np.prod(upper - lower):
         raise ValueError(f"{who}: the surface must enclose a volume, got {volume:.6g} m^3")
-    return Solid(lower, upper, volume, surface.query(winding=True)).fill(spacing, filling, relaxation, who)
+    solid = Solid(lower, upper, volume, surface.query(winding=True), surface.query(winding=False))
+    return solid.fill(spacing, filling, relaxation, who)
 
 
 @dataclass(frozen=True)
 class Patch:
-    """A region for boundary conditions: particles near a mesh's surface, or near one patch of it.
+    """A region for boundary conditions: particles near a mesh's surface, in 2-D its outline, or near one patch of it.
 
     Args:
         file: any mesh that meshio reads.
-        depth: distance from the triangles within which particles belong to the region [m].
+        depth: distance from the triangles, in 2-D from the lines, within which particles belong to the region [m].
         name: name or number of the patch in the file (gmsh physical group); None takes the whole surface.
         scale: length of the file's unit [m].
 
@@ -70,10 +72,13 @@ class Patch:
     scale: float = 1.0
 
     def __call__(self, X: np.ndarray) -> np.ndarray:
-        """Which of the positions [m], (n, 3), belong to the region, (n,) bool."""
-        if X.shape[1] != 3:
-            raise ValueError(f"a patch of a mesh needs particles in 3-D, got positions of shape {X.shape}")
-        surface = read_surface(self.file, self.scale)
-        if self.name is not None:
-            surface = surface.part(self.name)
-        return surface.query(winding=False)(X)[0] <= self.depth
+        """Which of the positions [m], (n, 2) or (n, 3), belong to the region, (n,) bool."""
+        if X.shape[1] == 1:
+            raise ValueError(f"a patch of a mesh needs particles in 2-D or 3-D, got positions of shape {X.shape}")
+        if X.shape[1] == 2:
+            lines = read_outline(self.file, self.scale)
+            distance = (lines if self.name is None else lines.part(self.name)).query(inside=False)
+        else:
+            surface = read_surface(self.file, self.scale)
+            distance = (surface if self.name is None else surface.part(self.name)).query(winding=False)
+        return distance(X)[0] <= self.depth

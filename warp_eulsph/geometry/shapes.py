@@ -34,7 +34,7 @@ def disc(
     Raises:
         ValueError: wrong shapes, lengths that are not positive, a spacing too coarse.
     """
-    return _round("disc", _point("disc", centre, 2), 0.0, radius, spacing, filling, relaxation)
+    return _round("disc", point("disc", centre, 2), 0.0, radius, spacing, filling, relaxation)
 
 
 def ring(
@@ -62,8 +62,8 @@ def ring(
     Raises:
         ValueError: as ``disc``, or inner not below outer.
     """
-    _hollow("ring", inner, outer)
-    return _round("ring", _point("ring", centre, 2), inner, outer, spacing, filling, relaxation)
+    hollow("ring", inner, outer)
+    return _round("ring", point("ring", centre, 2), inner, outer, spacing, filling, relaxation)
 
 
 def sphere(
@@ -89,7 +89,7 @@ def sphere(
     Raises:
         ValueError: as ``disc``.
     """
-    return _round("sphere", _point("sphere", centre, 3), 0.0, radius, spacing, filling, relaxation)
+    return _round("sphere", point("sphere", centre, 3), 0.0, radius, spacing, filling, relaxation)
 
 
 def cylinder(
@@ -147,15 +147,16 @@ def tube(
     Raises:
         ValueError: as ``cylinder``, or inner not below outer.
     """
-    _hollow("tube", inner, outer)
+    hollow("tube", inner, outer)
     return _along("tube", start, end, inner, outer, spacing, filling, relaxation)
 
 
-def _point(who: str, given: Sequence[float], dim: int) -> np.ndarray:
-    point = np.asarray(given, dtype=float)
-    if point.shape != (dim,) or not np.isfinite(point).all():
+def point(who: str, given: Sequence[float], dim: int) -> np.ndarray:
+    """``given`` as an array (dim,); ValueError, which names ``who``, where it is not that."""
+    found = np.asarray(given, dtype=float)
+    if found.shape != (dim,) or not np.isfinite(found).all():
         raise ValueError(f"{who}: points must be {dim} finite numbers [m], got {given}")
-    return point
+    return found
 
 
 def _positive(who: str, name: str, value: float) -> None:
@@ -163,8 +164,10 @@ def _positive(who: str, name: str, value: float) -> None:
         raise ValueError(f"{who}: {name} must be positive and finite, got {value} m")
 
 
-def _hollow(who: str, inner: float, outer: float) -> None:
+def hollow(who: str, inner: float, outer: float) -> None:
+    """ValueError, which names ``who``, unless 0 < inner < outer, both finite."""
     _positive(who, "inner", inner)
+    _positive(who, "outer", outer)
     if not inner < outer:
         raise ValueError(f"{who}: inner must be below outer, got {inner} and {outer} m")
 
@@ -197,7 +200,8 @@ def _round(
     filling: Filling,
     relaxation: Relaxation | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    _positive(who, "outer" if inner else "radius", outer)
+    if not inner:
+        _positive(who, "radius", outer)
     _resolved(who, outer - inner if inner else 2.0 * outer, spacing)
     volume = np.pi * (outer**2 - inner**2) if len(centre) == 2 else 4.0 / 3.0 * np.pi * outer**3
     # Filled about the origin, so that what is symmetric stays so to the last bit.
@@ -217,9 +221,10 @@ def _along(
     filling: Filling,
     relaxation: Relaxation | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    first, last = _point(who, start, 3), _point(who, end, 3)
+    first, last = point(who, start, 3), point(who, end, 3)
     length = float(np.linalg.norm(last - first))
-    _positive(who, "outer" if inner else "radius", outer)
+    if not inner:
+        _positive(who, "radius", outer)
     _positive(who, "distance from start to end", length)
     _resolved(who, min(length, outer - inner if inner else 2.0 * outer), spacing)
 

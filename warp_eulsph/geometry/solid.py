@@ -25,12 +25,14 @@ class Solid:
         volume: of the shape [m^dim].
         depth: positions [m], (k, dim) -> distance to the surface [m], positive inside, (k,), and the unit vectors
             along which it grows, (k, dim); at edges those of one of the faces.
+        beneath: the same for positions that lie inside, where it is faster to know that; ``depth`` otherwise.
     """
 
     lower: np.ndarray
     upper: np.ndarray
     volume: float
     depth: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+    beneath: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
 
     def fill(
         self, spacing: float, filling: Filling, relaxation: Relaxation | None, who: str
@@ -53,5 +55,5 @@ class Solid:
                 f"{self.volume:.6g} m^{x.shape[1]}; use at least two spacings across the thinnest part"
             )
         if relaxation is not None:
-            x = relaxation.relax(x, self.volume / len(x), self.depth)
+            x = relaxation.relax(x, self.volume / len(x), self.depth, self.beneath or self.depth)
         return x, np.full(len(x), self.volume / len(x))

@@ -4,11 +4,13 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import warp as wp
+
+from ..execution import Launcher
+from .mesh_file import MeshFile, read_mesh
 
 # Faces of a tetrahedron, outwards for one of positive volume.
 TETRA_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -78,7 +80,7 @@ class Surface:
             places = wp.array((x - centre).astype(np.float32), dtype=wp.vec3, device="cpu")
             closest, signs = wp.zeros_like(places), wp.zeros(len(x), dtype=wp.float32, device="cpu")
             far = reach + float(np.linalg.norm(x - centre, axis=1).max(initial=0.0))
-            wp.launch(_make_query(winding), len(x), [mesh.id, places, far, closest, signs], device="cpu")
+            Launcher("cpu")(_make_query(winding), len(x), [mesh.id, places, far, closest, signs])
             away = x - centre - closest.numpy()
             length = np.linalg.norm(away, axis=1)
             unit = np.divide(away, length[:, None], out=np.zeros_like(away), where=length[:, None] > 0.0)
@@ -92,13 +94,14 @@ class Surface:
 def _make_query(winding: bool) -> Any:
     @wp.kernel(module="unique", enable_backward=False)
     def query(
+        first: int,
         mesh: wp.uint64,
         x: wp.array(dtype=wp.vec3),
         far: wp.float32,
         closest: wp.array(dtype=wp.vec3),
         signs: wp.array(dtype=wp.float32),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         if wp.static(winding):
             found = wp.mesh_query_point_sign_winding_number(mesh, x[a], far)
             closest[a] = wp.mesh_eval_position(mesh, found.face, found.u, found.v)
@@ -112,7 +115,7 @@ def _make_query(winding: bool) -> Any:
 
 
 def read_surface(path: str | PathLike, scale: float = 1.0) -> Surface:
-    """The triangles of a mesh file that meshio reads (STL, OBJ, PLY, VTK, VTU, gmsh and others).
+    """The triangles of a mesh file that meshio reads.
 
     Quadrangles are cut in two; of tetrahedra the outer faces are taken, unless the file has surface elements.
 
@@ -121,64 +124,34 @@ def read_surface(path: str | PathLike, scale: float = 1.0) -> Surface:
         scale: length of the file's unit [m], 1e-3 for millimetres.
 
     Raises:
-        ModuleNotFoundError: meshio is not installed.
-        OSError: no such file.
-        ValueError: a file that meshio cannot read, or without triangles, quadrangles or tetrahedra.
+        ModuleNotFoundError, OSError: as ``read_mesh``.
+        ValueError: as ``read_mesh``, or without triangles, quadrangles or tetrahedra.
     """
-    try:
-        import meshio
-    except ModuleNotFoundError:
-        raise ModuleNotFoundError("reading meshes needs meshio: pip install 'warp_eulsph[mesh]'") from None
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"mesh file not found: {path}")
-    if not (np.isfinite(scale) and scale > 0.0):
-        raise ValueError(f"scale must be positive and finite, got {scale}; 1e-3 is a file in millimetres")
-    try:
-        mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # meshio raises whatever its readers stumble over, and may exit
-        raise ValueError(f"{path}: not a mesh that meshio reads ({type(error).__name__}: {error})") from error
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.points.shape[1]] = scale * mesh.points
-    groups = _groups(mesh)
-    triangles, numbers = _triangles(mesh, groups)
+    file = read_mesh(path, scale)
+    triangles, numbers = _triangles(file)
     if not len(triangles):
-        kinds = sorted({block.type for block in mesh.cells})
+        kinds = sorted(file.cells)
         raise ValueError(f"{path}: a mesh must have triangles, quadrangles or tetrahedra, got cells {kinds}")
-    if not np.isfinite(points).all():
-        raise ValueError(f"{path}: corners of a mesh must be finite")
     # Each corner once, as files of single facets (STL) repeat them.
-    points, places = np.unique(points, axis=0, return_inverse=True)
+    points, places = np.unique(file.points, axis=0, return_inverse=True)
     triangles = places.reshape(-1)[triangles]
     whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    names = {int(tag): name for name, (tag, *_) in mesh.field_data.items()}
-    patches = {names.get(int(k), str(int(k))): numbers[whole] == k for k in np.unique(numbers) if k >= 0}
+    patches = {file.patch(k): numbers[whole] == k for k in np.unique(numbers) if k >= 0}
     return Surface(points, triangles[whole], patches)
 
 
-def _groups(mesh: Any) -> list[np.ndarray]:
-    """The number of its group for each cell of each block, −1 without."""
-    for key in ("gmsh:physical", "medit:ref", "cell_tags", "obj:group_ids", "patch"):
-        if key in mesh.cell_data:
-            return [np.asarray(values).astype(int).reshape(-1) for values in mesh.cell_data[key]]
-    return [np.full(len(block.data), -1) for block in mesh.cells]
-
-
-def _triangles(mesh: Any, groups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _triangles(file: MeshFile) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (m, 3) and the number of the group of each, (m,)."""
     faces, numbers = [np.zeros((0, 3), dtype=int)], [np.zeros(0, dtype=int)]
-    for block, group in zip(mesh.cells, groups, strict=True):
-        corners = np.asarray(block.data)
-        if block.type == "triangle":
-            faces.append(corners)
-            numbers.append(group)
-        elif block.type == "quad":
-            faces.append(corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3))
-            numbers.append(np.repeat(group, 2))
-    if len(faces) == 1:
-        tetrahedra = [np.asarray(block.data) for block in mesh.cells if block.type == "tetra"]
-        if tetrahedra:
-            faces.append(_outer_faces(mesh.points, np.concatenate(tetrahedra)))
-            numbers.append(np.full(len(faces[-1]), -1))
+    if "triangle" in file.cells:
+        faces.append(file.cells["triangle"])
+        numbers.append(file.groups["triangle"])
+    if "quad" in file.cells:
+        faces.append(file.cells["quad"][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3))
+        numbers.append(np.repeat(file.groups["quad"], 2))
+    if len(faces) == 1 and "tetra" in file.cells:
+        faces.append(_outer_faces(file.points, file.cells["tetra"]))
+        numbers.append(np.full(len(faces[-1]), -1))
     return np.concatenate(faces), np.concatenate(numbers)
 
 

@@ -2,6 +2,7 @@
 
 from .checkpoint import DamagedError
 from .directory import BusyError, RunDirectory
+from .fields import FIELDS, TRANSPORT_FIELDS
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
 from .reader import Comparison, Run, RunFrame, points_on_line
 from .record import ChangedCaseError, Outcome, record
@@ -9,11 +10,12 @@ from .recording import Recording
 from .recover import Findings, check, recover
 from .report import Figure, table
 from .series import SnapshotWriter
-from .snapshot import FIELDS, Snapshot, read_snapshot, write_snapshot
+from .snapshot import Snapshot, read_snapshot, write_snapshot
 from .stopping import Stop
 
 __all__ = [
     "FIELDS",
+    "TRANSPORT_FIELDS",
     "BodyProbe",
     "BusyError",
     "ChangedCaseError",

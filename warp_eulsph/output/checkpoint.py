@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..simulation import Simulation
 from .atomic import replace_file
+from .fields import Recorded
 
 log = logging.getLogger(__name__)
 
@@ -35,8 +35,8 @@ class Checkpoint:
 
     Attributes:
         time: [s]. step: steps taken.
-        counters: numbers of ``Simulation.counters``.
-        arrays: copies of ``Simulation.evolving``, on the host.
+        counters: numbers beside the arrays (``counters`` of the simulation).
+        arrays: copies of what evolves (``evolving()`` of the simulation), on the host.
         description: of the simulation (see ``describe``). environment: versions and device.
     """
 
@@ -48,7 +48,7 @@ class Checkpoint:
     environment: dict[str, Any]
 
 
-def take(simulation: Simulation, description: Mapping[str, Any], environment: Mapping[str, Any]) -> Checkpoint:
+def take(simulation: Recorded, description: Mapping[str, Any], environment: Mapping[str, Any]) -> Checkpoint:
     """The present state, copied to the host."""
     arrays = {name: np.array(array.numpy()) for name, array in simulation.evolving().items()}
     counters = simulation.counters

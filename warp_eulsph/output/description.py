@@ -11,25 +11,50 @@ import numpy as np
 import warp as wp
 
 from ..simulation import Simulation
+from ..transport import Transport
+from .fields import Recorded
 
 
-def describe(simulation: Simulation) -> dict[str, Any]:
+def describe(simulation: Recorded) -> dict[str, Any]:
     """All options, bodies and conditions of a simulation, as JSON takes them.
 
     Arrays are told by shape and SHA-256, functions by name, source and the values they enclose. Two simulations of
     equal description take the same steps, as long as no function reads what it does not enclose.
     """
-    stepper = simulation.stepper
-    conditions = zip(simulation.boundaries, simulation.conditions, strict=True)
+    configuration = simulation.configuration
     return {
         "dimension": simulation.space.dim,
         "dtype": simulation.space.real.__name__,
+        "weight": plain(configuration.weight),
+        "periodic": [float(length) for length in configuration.lists.box],
+        **(_solids(simulation) if isinstance(simulation, Simulation) else _transport(simulation)),
+    }
+
+
+def _transport(transport: Transport) -> dict[str, Any]:
+    law, particles = transport.law, transport.particles
+    return {
+        "scheme": plain(law.scheme),
+        "flux": plain(law.flux),
+        "time_step": transport.time_step,
+        "exact": plain(transport.exact),
+        "particles": {
+            "x": plain(transport.x),
+            **{name: plain(getattr(particles, name).numpy()) for name in ("V0", "h")},
+            "start": plain(law.start),
+            "held": plain(law.held),
+        },
+    }
+
+
+def _solids(simulation: Simulation) -> dict[str, Any]:
+    stepper = simulation.stepper
+    conditions = zip(simulation.boundaries, simulation.conditions, strict=True)
+    return {
         "scheme": plain(stepper.options),
         "reference": plain(stepper.policy),
         "time_step": plain(simulation.clock.option),
-        "weight": plain(stepper.configuration.weight),
         "dilation": simulation.dilation,
-        "periodic": [float(length) for length in stepper.configuration.lists.box],
         "bodies": {body.name: plain(body) for body in simulation.bodies},
         "boundaries": {
             str(i): {**plain(boundary), "particles": plain(condition.indices)}

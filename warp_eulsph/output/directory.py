@@ -9,6 +9,7 @@
     log.jsonl                energies, momenta, extrema, one line per look
     probes/NAME/…h5          tables of the probes, never changed once they are there
     run.json                 what is run, with all defaults; env.json versions and device; status.json how it ended
+    case.toml, case.py       the case, to be run again
     abandoned/0001/          what an earlier run left, or steps that a resumed run takes again
 """
 
@@ -31,6 +32,8 @@ _TOP = (
     "log.jsonl",
     "probes",
     "run.json",
+    "case.toml",
+    "case.py",
     "env.json",
     "status.json",
 )
@@ -155,6 +158,14 @@ class RunDirectory:
             OSError: the disk refused; the file is as it was.
         """
         replace_file(path, (json.dumps(content, indent=1) + "\n").encode())
+
+    def keep(self, name: str, text: str) -> None:
+        """Replace ``case.toml`` or ``case.py``.
+
+        Raises:
+            OSError: the disk refused; the file is as it was.
+        """
+        replace_file(self.path / name, text.encode())
 
     def _abandoned(self) -> Path:
         folder = self.path / "abandoned"

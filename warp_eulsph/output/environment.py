@@ -4,10 +4,10 @@ import platform
 from pathlib import Path
 from typing import Any
 
-from ..simulation import Simulation
+from .fields import Recorded
 
 
-def environment(simulation: Simulation) -> dict[str, Any]:
+def environment(simulation: Recorded) -> dict[str, Any]:
     """Versions, device and precision of this process and ``simulation``, as JSON takes them."""
     from importlib import metadata  # slow to load, and the command line shows its help without
 
@@ -21,7 +21,7 @@ def environment(simulation: Simulation) -> dict[str, Any]:
             "name": device.name if device.is_cuda else _processor(),
             "kind": "cuda" if device.is_cuda else "cpu",
         },
-        "simd": simulation.stepper.configuration.simd,  # SIMD kernels differ from the portable ones by round-off
+        "simd": simulation.configuration.simd,  # SIMD kernels differ from the portable ones by round-off
         "machine": {"system": platform.system(), "architecture": platform.machine()},
         "dtype": simulation.space.real.__name__,
     }

@@ -8,8 +8,8 @@ import xarray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from .fields import KNOWN
 from .reader import DERIVED, Run, RunFrame
-from .snapshot import FIELDS
 
 AXES = "xyz"
 
@@ -51,15 +51,15 @@ def dataset(run: Run, fields: Sequence[str] | None) -> xarray.Dataset:
         if name == "particle":  # a coordinate
             continue
         series, attributes = _Series(run, name), {"units": units[name]}
-        if name in FIELDS:
-            attributes["long_name"] = FIELDS[name].meaning
+        if name in KNOWN:
+            attributes["long_name"] = KNOWN[name].meaning
         dimensions = ("time", "particle", *_components(name, series.shape[2:]))
         variables[name] = (dimensions, indexing.LazilyIndexedArray(series), attributes)
     made = xarray.Dataset(variables)
     coordinates: dict[str, Any] = {
         "time": ("time", run.times, {"units": "s"}),
         "step": ("time", run.steps),
-        "particle": ("particle", run[0].particles, {"long_name": FIELDS["particle"].meaning}),
+        "particle": ("particle", run[0].particles, {"long_name": KNOWN["particle"].meaning}),
         **{str(name): list(AXES[:size]) for name, size in made.sizes.items() if "axis" in str(name)},
     }
     return made.assign_coords(coordinates)

@@ -1,4 +1,4 @@
-"""The log of a run: energies, momenta and extrema, one line of JSON per look."""
+"""The log of a run: energies, momenta and extrema, or amounts of a transported quantity; a line of JSON per look."""
 
 import json
 from pathlib import Path
@@ -8,14 +8,17 @@ import numpy as np
 
 from ..simulation import Simulation
 from .atomic import append_line, replace_file
+from .fields import Recorded
 
 
-def look(simulation: Simulation) -> dict[str, Any]:
+def look(simulation: Recorded) -> dict[str, Any]:
     """What a line of the log holds of the present state; SI units."""
+    line = {"step": simulation.steps, "t": simulation.t, "dt": simulation.dt}
+    return line | (_solids(simulation) if isinstance(simulation, Simulation) else simulation.amounts())
+
+
+def _solids(simulation: Simulation) -> dict[str, Any]:
     return {
-        "step": simulation.steps,
-        "t": simulation.t,
-        "dt": simulation.dt,
         **simulation.energy(),
         "momentum": simulation.momentum().tolist(),
         "angular_momentum": simulation.angular_momentum().tolist(),

@@ -12,11 +12,12 @@ import numpy as np
 
 from ..schedule import next_target
 from ..scheme.health import UnstableError
-from ..simulation import Simulation
+from ..transport import Transport
 from .checkpoint import Checkpoint, Checkpoints, take
 from .description import describe, differences, plain
 from .directory import RunDirectory
 from .environment import environment
+from .fields import Recorded, chosen_fields
 from .log import append, cut, look
 from .probes import Measure
 from .recording import Recording
@@ -50,7 +51,7 @@ class Outcome:
 
 
 def record(
-    simulation: Simulation,
+    simulation: Recorded,
     directory: str | PathLike,
     until: float,
     recording: Recording = Recording(),
@@ -59,8 +60,9 @@ def record(
     force: bool = False,
     replace: bool = False,
     case: Mapping[str, Any] | None = None,
+    files: Mapping[str, str] = {},
     stop: Stop | None = None,
-    watch: Callable[[Simulation], object] | None = None,
+    watch: Callable[[Any], object] | None = None,
 ) -> Outcome:
     """Run to ``until`` [s], hit exactly, and keep in ``directory`` what ``recording`` asks for.
 
@@ -68,7 +70,7 @@ def record(
     the same versions.
 
     Args:
-        simulation: at its start, also to resume: it is put where the run was.
+        simulation: a ``Simulation`` or a ``Transport`` at its start, also to resume: it is put where the run was.
         directory: of the run, made if absent.
         until: end time [s].
         recording: what is kept.
@@ -76,6 +78,7 @@ def record(
         force: resume although the case has changed.
         replace: move a run that is there to ``abandoned/`` in the directory.
         case: how the simulation was built, for ``run.json``.
+        files: what builds it again, text by name: ``case.toml`` or ``case.py``.
         stop: asked after each step whether to stop; None never stops.
         watch: called after each step, to show progress.
 
@@ -84,7 +87,7 @@ def record(
         FileExistsError: a run is there, and neither ``resume`` nor ``replace`` is set.
         ChangedCaseError: the case has changed since the checkpoint; it names the changes.
         DamagedError: no checkpoint is whole.
-        UnstableError: see ``Simulation.run``; the last checkpoint and snapshot stay.
+        UnstableError: see ``Simulation.run`` and ``Transport.advance``; the last checkpoint and snapshot stay.
         OSError: the disk refused; all that was written before is whole, and the run can be resumed.
         ValueError: ``until`` is before the present time, a probe looks at what is not there, or a wrong region.
     """
@@ -94,8 +97,9 @@ def record(
         present = simulation.t if checkpoint is None else checkpoint.time
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
-        # What is wrong with probes and region is told before files move
-        measures = [probe.bind(simulation) for probe in recording.probes]
+        # What is wrong with fields, probes and region is told before files move
+        chosen_fields(recording.fields, simulation)
+        measures = _measures(simulation, recording)
         particles = recording.particles(simulation)
         description = _description(simulation, recording, particles)
         if resume and checkpoint is None and home.holds_a_run:
@@ -105,6 +109,8 @@ def record(
         else:
             _go_on(home, simulation, description, checkpoint, force=force)
         home.write(home.description, {"until": until, "case": dict(case or {}), **description})
+        for name, text in files.items():
+            home.keep(name, text)
         snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, particles=particles, resume=True)
         recorder = _Recorder(
             home, simulation, recording, measures, snapshots, description, resumed=checkpoint is not None
@@ -112,7 +118,16 @@ def record(
         return recorder.run(until, stop, watch)
 
 
-def _begin(home: RunDirectory, simulation: Simulation, *, replace: bool) -> None:
+def _measures(simulation: Recorded, recording: Recording) -> list[Measure]:
+    """What the probes measure."""
+    if isinstance(simulation, Transport):
+        if recording.probes:
+            raise ValueError(f"probes look at solids, got {recording.probes[0].name!r} for a transported quantity")
+        return []
+    return [probe.bind(simulation) for probe in recording.probes]
+
+
+def _begin(home: RunDirectory, simulation: Recorded, *, replace: bool) -> None:
     """Make room for a new run."""
     if home.holds_a_run and not replace:
         raise FileExistsError(f"{home.path} holds a run; resume it, choose another directory, or replace it")
@@ -121,7 +136,7 @@ def _begin(home: RunDirectory, simulation: Simulation, *, replace: bool) -> None
 
 
 def _go_on(
-    home: RunDirectory, simulation: Simulation, description: Mapping[str, Any], checkpoint: Checkpoint, *, force: bool
+    home: RunDirectory, simulation: Recorded, description: Mapping[str, Any], checkpoint: Checkpoint, *, force: bool
 ) -> None:
     """Put the simulation where the run was, and set aside what the run has of later steps."""
     _compare(checkpoint, simulation, description, force)
@@ -133,20 +148,20 @@ def _go_on(
     log.info("resumed at step %d, t = %.8g s", checkpoint.step, checkpoint.time)
 
 
-def _description(simulation: Simulation, recording: Recording, particles: np.ndarray | None) -> dict[str, Any]:
+def _description(simulation: Recorded, recording: Recording, particles: np.ndarray | None) -> dict[str, Any]:
     kept = {**plain(recording), "particles": plain(particles)}
     del kept["checkpoint"]  # wall time, which changes no step
     return {"simulation": describe(simulation), "recording": kept}
 
 
-def _compare(checkpoint: Checkpoint, simulation: Simulation, description: Mapping[str, Any], force: bool) -> None:
+def _compare(checkpoint: Checkpoint, simulation: Recorded, description: Mapping[str, Any], force: bool) -> None:
     """Raise, or with ``force`` warn, when the case has changed; warn when the machine has."""
     changes = differences(checkpoint.description, description)
     if changes and not force:
         listed = "\n  ".join(changes)
         raise ChangedCaseError(
             f"the case has changed since the checkpoint of step {checkpoint.step}:\n  {listed}\n"
-            "undo the changes, run it in another directory, or force the resume"
+            "undo the changes, run it in another directory, or go on all the same with --force (force=True)"
         )
     for change in changes:
         log.warning("resuming a changed case: %s", change)
@@ -160,7 +175,7 @@ class _Recorder:
     def __init__(
         self,
         home: RunDirectory,
-        simulation: Simulation,
+        simulation: Recorded,
         recording: Recording,
         measures: Sequence[Measure],
         snapshots: SnapshotWriter,
@@ -186,7 +201,7 @@ class _Recorder:
         self.worker.drain()
         return self.snapshots.last
 
-    def run(self, until: float, stop: Stop | None, watch: Callable[[Simulation], object] | None) -> Outcome:
+    def run(self, until: float, stop: Stop | None, watch: Callable[[Any], object] | None) -> Outcome:
         simulation, before = self.simulation, self.simulation.output
         simulation.output = self
         self._note_status("running", until)

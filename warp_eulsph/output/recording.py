@@ -9,9 +9,9 @@ import numpy as np
 
 from ..boundaries import Assembly, Region
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
-from ..simulation import Simulation
+from .fields import Recorded, known_fields
 from .probes import Probe
-from .snapshot import checked_precision, chosen_fields
+from .snapshot import checked_precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +20,7 @@ class Recording:
 
     Args:
         snapshots: when a snapshot is written besides the start and the end.
-        fields: names of ``FIELDS`` in them; all by default.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``) in them; all by default.
         dtype: ``np.float32`` or ``np.float64`` of their reals.
         region: which particles are in them (see ``Region`` of the boundaries), by initial positions or numbers; all by
             default. Their numbers are in the field ``particle``. Log, probes and checkpoints are of all particles.
@@ -44,7 +44,7 @@ class Recording:
     checkpoint: float = 600.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "fields", tuple(chosen_fields(self.fields)))
+        object.__setattr__(self, "fields", known_fields(self.fields))
         object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
         object.__setattr__(self, "probes", tuple(self.probes))
         names = [probe.name for probe in self.probes]
@@ -53,7 +53,7 @@ class Recording:
         if math.isnan(self.checkpoint) or self.checkpoint <= 0.0:
             raise ValueError(f"checkpoint must be a positive wall time [s], got {self.checkpoint}; 600 is 10 minutes")
 
-    def particles(self, simulation: Simulation) -> np.ndarray | None:
+    def particles(self, simulation: Recorded) -> np.ndarray | None:
         """Numbers of the particles that snapshots hold, (k,) int32; None if all.
 
         Raises:
@@ -61,8 +61,7 @@ class Recording:
         """
         if self.region is None and self.body is None:
             return None
-        X = np.concatenate([body.x for body in simulation.bodies])
-        assembly = Assembly(simulation.space, simulation.device, X, simulation.particles, simulation.ranges)
+        assembly = Assembly(simulation.space, simulation.device, simulation.X, simulation.particles, simulation.ranges)
         return assembly.select(self.region, self.body, "Recording")
 
     @property

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..simulation import Simulation
 from .atomic import replace_file
 from .directory import RunDirectory
+from .fields import Recorded, known_fields
 from .manifest import Manifest, entry_of
-from .snapshot import Frame, checked_precision, chosen_fields, collect, encode
+from .snapshot import Frame, checked_precision, collect, encode
 from .temporal import write_index
 
 # The index names every snapshot, so that making it costs more from frame to frame: a tenth more of them is worth it.
@@ -32,7 +32,7 @@ class SnapshotWriter:
 
     Args:
         directory: of the run; made if absent.
-        fields: names of ``snapshot.FIELDS``; all if None.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); all if None.
         dtype: ``np.float32`` or ``np.float64`` of the stored reals.
         particles: numbers of those that snapshots hold, (k,), written as the field ``particle`` too; all if None.
         resume: go on after the snapshots that are there.
@@ -51,10 +51,10 @@ class SnapshotWriter:
         resume: bool = False,
     ):
         self.directory = Path(directory)
-        self.fields, self.dtype = chosen_fields(fields), checked_precision(dtype)
+        self.fields, self.dtype = known_fields(fields), checked_precision(dtype)
         self.particles, self.manifest = particles, Manifest(self.directory)
-        if particles is not None and "particle" not in self.fields:
-            self.fields.append("particle")
+        if particles is not None and self.fields is not None and "particle" not in self.fields:
+            self.fields = (*self.fields, "particle")
         self._indexed = 0
         if not resume:
             RunDirectory(self.directory).abandon()
@@ -78,7 +78,7 @@ class SnapshotWriter:
         """The file over all snapshots, for ParaView."""
         return self.directory / "run.vtkhdf"
 
-    def write(self, simulation: Simulation) -> Path:
+    def write(self, simulation: Recorded) -> Path:
         """Write the present state; the path of its file.
 
         Raises:
@@ -86,7 +86,7 @@ class SnapshotWriter:
         """
         return self.commit(self.collect(simulation))
 
-    def collect(self, simulation: Simulation) -> Frame:
+    def collect(self, simulation: Recorded) -> Frame:
         """The present state, copied, for ``commit`` to write."""
         return collect(simulation, self.fields, self.particles)
 

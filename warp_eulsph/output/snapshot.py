@@ -1,76 +1,18 @@
 """One frame, one immutable file: plain HDF5 that is a static VTKHDF PolyData too (ParaView, VTK, PyVista, h5py)."""
 
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..fields import PARTICLES, STATE
-from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
-from ..simulation import Simulation
+from ..fields import STATE
 from .atomic import replace_file
-from .stress import cauchy_stress, padded
-
-
-class SnapshotField(NamedTuple):
-    """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and how it is made of sources."""
-
-    shape: Callable[[int], tuple[int, ...]]
-    unit: str
-    meaning: str
-    sources: tuple[str, ...]
-    values: Callable[..., np.ndarray] = lambda source: source
-
-
-#: What fields are made of: copied from the device while the run waits, where what is made of them is not.
-SOURCES: dict[str, Callable[[Simulation], np.ndarray]] = {
-    "x": lambda simulation: simulation.x,
-    "v": lambda simulation: simulation.v,
-    "F": lambda simulation: simulation.F,
-    "J": lambda simulation: simulation.J,
-    "stress": cauchy_stress,
-    "mass": lambda simulation: simulation.particles.mass.numpy().copy(),
-    "V0": lambda simulation: simulation.particles.V0.numpy().copy(),
-    "body": lambda simulation: simulation.particles.body.numpy().copy(),
-    "share": lambda simulation: simulation.particles.share.numpy().copy(),
-    "h": lambda simulation: simulation.particles.h.numpy().copy(),
-    "particle": lambda simulation: np.arange(len(simulation.particles.mass), dtype=np.int32),
-}
-
-#: Every field that a snapshot can hold. Stress has nine components in any dimension: σ33 of plane strain counts.
-FIELDS = {
-    "velocity": SnapshotField(lambda d: (d,), STATE["v"].unit, STATE["v"].meaning, ("v",)),
-    "deformation_gradient": SnapshotField(
-        lambda d: (d, d), STATE["F"].unit, STATE["F"].meaning + "; missing stretches are 1", ("F",)
-    ),
-    "J": SnapshotField(lambda d: (), "-", "volume over initial volume, det F", ("J",)),
-    "cauchy_stress": SnapshotField(lambda d: (3, 3), "Pa", "Cauchy stress", ("stress",)),
-    "pressure": SnapshotField(
-        lambda d: (),
-        "Pa",
-        "pressure, minus a third of the trace of the stress",
-        ("stress",),
-        lambda stress: -np.trace(stress.T) / 3.0,
-    ),
-    "density": SnapshotField(
-        lambda d: (), "kg/m^3", "density", ("mass", "V0", "J"), lambda mass, V0, J: mass / (V0 * J)
-    ),
-    "body": SnapshotField(lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, ("body",)),
-    "share": SnapshotField(lambda d: (), PARTICLES["share"].unit, PARTICLES["share"].meaning, ("share",)),
-    "volume": SnapshotField(lambda d: (), PARTICLES["V0"].unit, "volume", ("V0", "J"), lambda V0, J: V0 * J),
-    "smoothing_length": SnapshotField(
-        lambda d: (),
-        "m",
-        "smoothing length of the present configuration",
-        ("x", "h", "J"),
-        lambda x, h, J: h * np.clip(J ** (1.0 / x.shape[1]), LEAST_GROWTH, LARGEST_GROWTH),
-    ),
-    "particle": SnapshotField(lambda d: (), "-", "number of the particle in the simulation", ("particle",)),
-}
+from .fields import SOURCES, Recorded, SnapshotField, chosen_fields
+from .stress import padded
 
 
 @dataclass(frozen=True)
@@ -92,32 +34,19 @@ class Snapshot:
     units: dict[str, str]
 
 
-def chosen_fields(names: Iterable[str] | None) -> list[str]:
-    """The names, checked; all fields if None.
-
-    Raises:
-        ValueError: a name that is not in ``FIELDS``.
-    """
-    wanted = list(FIELDS) if names is None else list(names)
-    unknown = [name for name in wanted if name not in FIELDS]
-    if unknown:
-        raise ValueError(f"snapshot fields must be among {list(FIELDS)}, got {unknown}")
-    return wanted
-
-
 @dataclass(frozen=True)
 class Frame:
     """A state on the host, ready to be written while the simulation goes on.
 
     Attributes:
         time: [s]. step: steps taken. dim: dimension.
-        names: of the fields to write. sources: what they are made of, (n, …) each, with the positions ``x`` [m].
+        fields: to write, by name. sources: what they are made of, (n, …) each, with the positions ``x`` [m].
     """
 
     time: float
     step: int
     dim: int
-    names: tuple[str, ...]
+    fields: Mapping[str, SnapshotField]
     sources: dict[str, np.ndarray]
 
     @property
@@ -127,16 +56,17 @@ class Frame:
 
     def values(self) -> dict[str, np.ndarray]:
         """The fields by name, in their natural shape."""
-        fields = ((name, FIELDS[name]) for name in self.names)
-        return {name: field.values(*(self.sources[source] for source in field.sources)) for name, field in fields}
+        held = self.sources
+        return {name: field.values(*(held[source] for source in field.sources)) for name, field in self.fields.items()}
 
 
-def collect(simulation: Simulation, names: Iterable[str], particles: np.ndarray | None = None) -> Frame:
-    """What the fields of these ``names`` are made of in the present state, copied; of all ``particles`` if None."""
-    names, chosen = tuple(names), slice(None) if particles is None else particles
-    needed = dict.fromkeys(["x", *(source for name in names for source in FIELDS[name].sources)])
+def collect(simulation: Recorded, names: Iterable[str] | None, particles: np.ndarray | None = None) -> Frame:
+    """What the fields of these ``names``, all if None, are made of in the present state, copied; of all ``particles``
+    if None."""
+    fields, chosen = chosen_fields(names, simulation), slice(None) if particles is None else particles
+    needed = dict.fromkeys(["x", *(source for field in fields.values() for source in field.sources)])
     sources = {name: SOURCES[name](simulation)[chosen] for name in needed}
-    return Frame(simulation.t, simulation.steps, simulation.space.dim, names, sources)
+    return Frame(simulation.t, simulation.steps, simulation.space.dim, fields, sources)
 
 
 def checked_precision(dtype: Any) -> np.dtype:
@@ -151,14 +81,14 @@ def checked_precision(dtype: Any) -> np.dtype:
 
 
 def write_snapshot(
-    path: str | PathLike, simulation: Simulation, fields: Iterable[str] | None = None, *, dtype: Any = np.float32
+    path: str | PathLike, simulation: Recorded, fields: Iterable[str] | None = None, *, dtype: Any = np.float32
 ) -> None:
     """Write the present state to ``path``, which appears whole or not at all.
 
     Args:
         path: file to make or replace, by custom ``*.vtkhdf``.
         simulation: its state.
-        fields: names of ``FIELDS``; all if None. Positions are always there.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); all if None. Positions are always there.
         dtype: ``np.float32`` or ``np.float64`` for positions and real fields; time is float64 always.
 
     Raises:
@@ -166,7 +96,7 @@ def write_snapshot(
         OSError: nothing was written; what ``path`` held before is still there.
     """
     precision = checked_precision(dtype)
-    replace_file(Path(path), encode(collect(simulation, chosen_fields(fields)), precision))
+    replace_file(Path(path), encode(collect(simulation, fields), precision))
 
 
 def encode(frame: Frame, dtype: np.dtype) -> bytes:
@@ -190,7 +120,7 @@ def encode(frame: Frame, dtype: np.dtype) -> bytes:
         _write_cells(root, n)
         data = root.create_group("PointData")
         for name, value in values.items():
-            _write_field(data, name, value, dim, dtype)
+            _write_field(data, name, frame.fields[name], value, dim, dtype)
         _mark_active(data, values)
         root["FieldData/TimeValue"] = np.array([frame.time])  # the name VTK gives to a data set's time
         root["FieldData/Step"] = np.array([frame.step], dtype=np.int64)
@@ -208,8 +138,7 @@ def _write_cells(root: Any, n: int) -> None:
             group.create_dataset(name, data=ids, compression="gzip" if size > 1 else None)
 
 
-def _write_field(data: Any, name: str, value: np.ndarray, dim: int, dtype: np.dtype) -> None:
-    field = FIELDS[name]
+def _write_field(data: Any, name: str, field: SnapshotField, value: np.ndarray, dim: int, dtype: np.dtype) -> None:
     shape = field.shape(dim)
     stored = value if value.dtype.kind == "i" else value.astype(dtype)
     if len(shape) == 1:

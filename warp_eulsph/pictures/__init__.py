@@ -5,6 +5,6 @@ rather than dots.
 """
 
 from .draw import Picture, draw_frame, film, fitted, picture
-from .quantity import Quantity, quantity
+from .quantity import Quantity, default_field, quantity
 
-__all__ = ["Picture", "Quantity", "draw_frame", "film", "fitted", "picture", "quantity"]
+__all__ = ["Picture", "Quantity", "default_field", "draw_frame", "film", "fitted", "picture", "quantity"]

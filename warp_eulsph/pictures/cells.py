@@ -20,13 +20,17 @@ def spacing(x: np.ndarray) -> float:
 
 
 def corners(frame: RunFrame, size: float) -> np.ndarray:
-    """Corners of each particle's cell [m], (n, 2^dim, dim): x_a + F_a c with c those of a cube of edge ``size`` [m].
+    """Corners of each particle's cell [m], (n, 2^dim, dim): x_a + F_a c with c those of a cube that holds its volume.
 
-    Corner k has the bits of k as its places along the axes. Without a deformation gradient cells stay cubes.
+    Corner k has the bits of k as its places along the axes. Without a deformation gradient cells stay cubes; where the
+    frame holds no volume, all have edges of ``size`` [m].
     """
     x = frame.x.astype(float)
     dim = x.shape[1]
     unit = np.array([[(k >> i & 1) - 0.5 for i in range(dim)] for k in range(2**dim)])
-    F = frame.F if "deformation_gradient" in frame.units else np.eye(dim)[None]
-    offsets = np.einsum("nij,kj->nki", F.astype(float), size * unit)
+    F = frame.F.astype(float) if "deformation_gradient" in frame.units else np.eye(dim)[None]
+    edges = np.full(len(x), size)
+    if "volume" in frame.units:
+        edges = (frame["volume"].astype(float) / np.abs(np.linalg.det(F))) ** (1.0 / dim)
+    offsets = edges[:, None, None] * np.einsum("nij,kj->nki", F, unit)
     return x[:, None, :] + offsets

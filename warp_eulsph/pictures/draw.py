@@ -91,8 +91,10 @@ def film(
         raise ValueError(f"{path}: the ending of a film must be one of {', '.join(FILMS)}, got {path.suffix!r}")
     if not (np.isfinite(fps) and fps > 0.0):
         raise ValueError(f"frames per second must be positive and finite, got {fps}")
-    if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
-        raise FileNotFoundError(f"{path}: an MP4 needs the program ffmpeg; install it, or choose a .gif")
+    if path.suffix == ".mp4" and _ffmpeg() is None:
+        raise FileNotFoundError(
+            f"{path}: an MP4 needs the program ffmpeg; install it or pip install imageio-ffmpeg, or choose a .gif"
+        )
     which = range(len(run)) if frames is None else frames
     # Each frame is opened anew: a frame keeps what was read from it.
     chosen = fitted(options, (run[k] for k in which))
@@ -115,8 +117,8 @@ def fitted(options: Picture, frames: Iterable[RunFrame]) -> Picture:
     """
     edge, low, high, least, largest = options.spacing, None, None, np.inf, -np.inf
     for frame in frames:
-        values = quantity(frame, options.field).values
-        least, largest = min(least, float(values.min())), max(largest, float(values.max()))
+        lowest, highest = quantity(frame, options.field).range
+        least, largest = min(least, lowest), max(largest, highest)
         x = frame.x.astype(float)
         if edge is None:
             edge = spacing(x)
@@ -141,6 +143,18 @@ def _pillow() -> Any:
     return Image
 
 
+def _ffmpeg() -> str | None:
+    """The program: the system's, or the one that the package imageio-ffmpeg brings; None without."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        try:
+            import imageio_ffmpeg
+        except ModuleNotFoundError:
+            return None
+        found = str(imageio_ffmpeg.get_ffmpeg_exe())
+    return found
+
+
 def _save_gif(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
     frames = [_pillow().fromarray(image) for image in images]
     duration = max(20, round(1000.0 / fps))  # ms; browsers slow down what is faster
@@ -151,7 +165,18 @@ def _save_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
     stream = iter(images)
     first = next(stream)
     height, width = (side - side % 2 for side in first.shape[:2])  # the encoder takes even sides only
-    command = ["ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+    command = [
+        _ffmpeg() or "ffmpeg",
+        "-loglevel",
+        "error",
+        "-y",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+    ]
     command += ["-r", f"{fps:g}", "-i", "-", "-pix_fmt", "yuv420p", str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None and encoder.stderr is not None

@@ -34,7 +34,10 @@ def draw_line(frame: RunFrame, options: Any) -> np.ndarray:
     shown = quantity(frame, options.field)
     order = np.argsort(frame.x[:, 0])
     axes = figure.add_subplot()
-    axes.plot(frame.x[order, 0], shown.values[order], ".-", lw=1, ms=4)
+    axes.plot(frame.x[order, 0], shown.values[order], ".-", lw=1, ms=4, label="computed")
+    if shown.exact is not None:
+        axes.plot(frame.x[order, 0], shown.exact[order], "k:", lw=1, label="exact")
+        axes.legend(loc="upper right")
     axes.set(xlabel="x [m]", ylabel=shown.label, title=_title(frame))
     if options.limits is not None:
         axes.set_ylim(*_widened(options.limits))

@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from ..fields import neighbour_structure, structure
+from ..fields import arrays, neighbour_structure, structure
 from ..linalg import det, inverse
 from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
@@ -22,7 +22,11 @@ RELAXATION = {1: 0.52, 2: 0.75, 3: 0.85}
 
 # Disorder |½ψ|, over the spacing, at which half of the lean is taken: little of it in lattices, nearly all of it where
 # particles have begun to rearrange. At first order in the disorder there is none.
-LEANING = 0.02
+LEANING = 0.01
+
+# Stress over the modulus of pressure waves at which half of the lean is taken: waves of small strain, which rearrange
+# nothing, run as in the balanced arrangement.
+LOADED = 0.01
 
 # A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
 OPENED = 1.0
@@ -30,16 +34,16 @@ OPENED = 1.0
 
 @dataclass(frozen=True)
 class Balance:
-    """Pair vectors of M4 and M5 from x̂ = x − ½(1 + λT)ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
+    """Pair vectors of M4 and M5 from x̂ = x − ½(1 + λQ̂)ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
 
     M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
     it, whatever x̂ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
     which are the ones that pair particles up. Where e_a − s_a exceeds the particle's own face, the body has opened
     or closed: s_a becomes e_a, a free surface or none.
 
-    What is closed exactly does not return either: particles that something has moved, stay. So along directions of
-    tension, T of the stress, a disordered arrangement is corrected too far, by up to the share λ = ``lean``: there it
-    pushes back.
+    What is closed exactly does not return either: particles that something has moved, stay. So in a disordered
+    arrangement under stress, Q̂ = Q/|Q|, it is corrected too far along tension and too little along compression, by up
+    to the share λ = ``lean``: either pushes back.
 
     Args:
         sweeps: relaxation sweeps per refresh, from ψ = 0.
@@ -49,7 +53,7 @@ class Balance:
 
     sweeps: int = 5
     bound: float = 0.25
-    lean: float = 1.0
+    lean: float = 1.5
 
     def __post_init__(self) -> None:
         if self.sweeps < 1:
@@ -57,7 +61,7 @@ class Balance:
         if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
             raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.25 is the tested value")
         if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 2.0):
-            raise ValueError(f"lean must be in [0, 2], got {self.lean}; 1 is the tested value")
+            raise ValueError(f"lean must be in [0, 2], got {self.lean}; 1.5 is the tested value")
 
     def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "BalancedPairs":
         """Allocate."""
@@ -117,27 +121,13 @@ def _make_relax(space: Space, simd: bool, start: bool) -> Any:
 
 
 @functools.cache
-def tension(space: Space) -> Any:
-    """``wp.func`` T = ½(Q̂ + Q̂²), Q̂ = Q/|Q|: near 1 along directions of tension, near 0 along those of compression."""
-    real, mat = space.real, space.mat
-
-    @wp.func
-    def tension(Q: mat) -> mat:
-        T = mat()
-        size = wp.sqrt(wp.ddot(Q, Q))
-        if size > real(0.0):
-            T = Q / size
-            T = (T + T @ T) * real(0.5)
-        return T
-
-    return tension
-
-
-@functools.cache
 def _make_shift(space: Space) -> Any:
-    """Kernel: x̂ = x − ½(1 + λT)ψ, λ = lean m²/(m² + LEANING²), m = |½ψ| and |x̂ − x| ≤ ``bound``, both in spacings."""
-    real, vec, mat = space.real, space.vec, space.mat
-    Particles, Reference, T_of = structure(space, "Particles"), structure(space, "Reference"), tension(space)
+    """Kernel: x̂ = x − ½(1 + λQ̂)ψ, |x̂ − x| ≤ ``bound``, λ = lean m²/(m² + LEANING²) q²/(q² + LOADED²) (M13).
+
+    m = |½ψ| and the bound are in spacings, q is |Q| over the modulus of pressure waves, Q̂ = Q/|Q|.
+    """
+    real, vec = space.real, space.vec
+    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(
@@ -145,7 +135,7 @@ def _make_shift(space: Space) -> Any:
         particles: Particles,
         reference: Reference,
         psi: wp.array(dtype=vec),
-        Q: wp.array(dtype=mat),
+        flux: Flux,
         bound: real,
         lean: real,
     ):
@@ -154,7 +144,11 @@ def _make_shift(space: Space) -> Any:
         away = psi[a] * real(0.5)
         disorder = wp.dot(away, away) / (spacing * spacing)
         share = lean * disorder / (disorder + real(LEANING * LEANING))
-        away += T_of(Q[a]) @ away * share
+        Q, modulus = flux.Q[a], flux.impedance[a] * flux.speed[a] * real(LOADED)
+        load = wp.ddot(Q, Q)
+        if load > real(0.0):
+            share *= wp.sqrt(load) / (load + modulus * modulus)
+        away += Q @ away * share
         most = bound * spacing
         if wp.length(away) > most:
             away = away * (most / wp.length(away))
@@ -188,13 +182,16 @@ class BalancedPairs(UpwindForces):
 
     def __init__(self, option: Balance, space: Space, particles: Any, flux: Flux, device: Any):
         super().__init__(space, device)
-        self.stress = flux.fields.Q  # of the last step when a refresh asks for it
+        self.flux = flux.fields  # of the last step when a refresh asks for it
         self.option, self.particles, n = option, particles, len(particles.mass)
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
 
     def evolving(self) -> dict[str, wp.array]:
-        """The stress that the next refresh leans on, and the potentials that shifting (M15) follows before it."""
-        return {"BalancedPairs.psi": self.psi, "BalancedPairs.stress": self.stress}
+        """The potentials that shifting (M15) follows before the next refresh, and what that one leans on."""
+        flux = arrays(self.flux, "Flux")
+        return {"BalancedPairs.psi": self.psi} | {
+            name: flux[name] for name in ("Flux.Q", "Flux.impedance", "Flux.speed")
+        }
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Balance the new reference."""
@@ -205,6 +202,6 @@ class BalancedPairs(UpwindForces):
             arguments = [reference, near, configuration.K, self.defect, self.psi, self._other]
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
             self.psi, self._other = self._other, self.psi
-        arguments = [self.particles, reference, self.psi, self.stress, self.option.bound, self.option.lean]
+        arguments = [self.particles, reference, self.psi, self.flux, self.option.bound, self.option.lean]
         self._launch(_make_shift(self.space), n, arguments)
         self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])

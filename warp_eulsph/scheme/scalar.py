@@ -153,6 +153,9 @@ class ConservationLaw:
     Attributes:
         U, half: (n,) of one-component rows, Uⁿ and the half step.
         t: time [s].
+        flux: as given.
+        start: initial values, (n,).
+        held: numbers of the held particles, (k,).
     """
 
     def __init__(
@@ -178,7 +181,7 @@ class ConservationLaw:
             raise ValueError(f"initial values must have shape ({n},), got {np.shape(U)}")
         self.space = space = Space(dim, dtype, periodic is not None)
         self.device, self.scheme, self.n, self.t = wp.get_device(device), scheme, n, 0.0
-        self.function = flux
+        self.flux = self.function = flux
         if isinstance(flux, LinearAdvection):
             if len(flux.velocity) != dim:
                 raise ValueError(f"advection velocity must have {dim} components, got {flux.velocity}")
@@ -205,6 +208,7 @@ class ConservationLaw:
         chosen = np.zeros(0, dtype=np.int32)
         if held is not None:
             chosen = Assembly(space, self.device, x, particles, {}).select(held, None, "held")
+        self.start, self.held = np.array(U, dtype=float), chosen
         self._held = wp.array(chosen, dtype=wp.int32, device=self.device)
         self._held_values = wp.array(np.reshape(U, (n, 1))[chosen], dtype=row, device=self.device)
 

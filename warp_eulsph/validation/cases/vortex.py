@@ -24,6 +24,7 @@ import numpy as np
 import warp as wp
 
 from ... import Always, Body, BodyForce, NeoHookeanLog, Never, ReferencePolicy, Simulation, UnstableError
+from ...geometry import annulus
 from ...output import Figure
 from ..case import Case
 from ..figures import order
@@ -90,25 +91,10 @@ def make_force(amplitude: float, rings: int) -> Any:
     return force
 
 
-def annulus(rings: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Particles on ``rings`` staggered rings: positions (n, 2), volumes and spacings (n,).
-
-    The conformal image of a square lattice: radii in geometric progression make the cells square everywhere, and their
-    volumes sum exactly to that of the ring.
-    """
-    edges = INNER * (OUTER / INNER) ** (np.arange(rings + 1) / rings)
-    around = round(2.0 * math.pi * rings / math.log(OUTER / INNER))
-    R = np.sqrt(edges[1:] * edges[:-1])
-    angles = 2.0 * math.pi / around * (np.arange(around)[None, :] + 0.5 * (np.arange(rings)[:, None] % 2))
-    x = np.stack([R[:, None] * np.cos(angles), R[:, None] * np.sin(angles)], axis=-1).reshape(-1, 2)
-    volume = np.repeat(math.pi * (edges[1:] ** 2 - edges[:-1] ** 2) / around, around)
-    return x, volume, np.sqrt(volume)
-
-
 def build(rings: int, reference: ReferencePolicy, amplitude: float = 1.0, **options: Any) -> Simulation:
     """The ring with its body force, set off at the exact velocity; ``options`` are those of ``Simulation``."""
-    x, volume, spacing = annulus(rings)
-    body = Body(x=x, volume=volume, spacing=spacing, material=RING, velocity=exact(x, 0.0, amplitude)[1])
+    x, volume = annulus((0.0, 0.0), INNER, OUTER, rings)
+    body = Body(x=x, volume=volume, material=RING, velocity=exact(x, 0.0, amplitude)[1])
     force = BodyForce(make_force(amplitude, rings), material=True)
     return Simulation(body, boundaries=[force], reference=reference, **options)
 

@@ -1,0 +1,113 @@
+"""What snapshots can hold: fields of solids, and of a transported quantity."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..fields import PARTICLES, STATE
+from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
+from ..simulation import Simulation
+from ..transport import Transport
+from .stress import cauchy_stress
+
+#: What can be recorded.
+Recorded = Simulation | Transport
+
+
+class SnapshotField(NamedTuple):
+    """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and how it is made of sources."""
+
+    shape: Callable[[int], tuple[int, ...]]
+    unit: str
+    meaning: str
+    sources: tuple[str, ...]
+    values: Callable[..., np.ndarray] = lambda source: source
+
+
+#: What fields are made of: copied from the device while the run waits, where what is made of them is not.
+SOURCES: dict[str, Callable[[Any], np.ndarray]] = {
+    "x": lambda simulation: simulation.x,
+    "v": lambda simulation: simulation.v,
+    "F": lambda simulation: simulation.F,
+    "J": lambda simulation: simulation.J,
+    "stress": cauchy_stress,
+    "mass": lambda simulation: simulation.particles.mass.numpy().copy(),
+    "V0": lambda simulation: simulation.particles.V0.numpy().copy(),
+    "body": lambda simulation: simulation.particles.body.numpy().copy(),
+    "share": lambda simulation: simulation.particles.share.numpy().copy(),
+    "h": lambda simulation: simulation.particles.h.numpy().copy(),
+    "particle": lambda simulation: np.arange(len(simulation.particles.mass), dtype=np.int32),
+    "U": lambda transport: transport.values,
+    "exact": lambda transport: transport.exact_values,
+}
+
+#: Fields of solids. Stress has nine components in any dimension: σ33 of plane strain counts.
+FIELDS = {
+    "velocity": SnapshotField(lambda d: (d,), STATE["v"].unit, STATE["v"].meaning, ("v",)),
+    "deformation_gradient": SnapshotField(
+        lambda d: (d, d), STATE["F"].unit, STATE["F"].meaning + "; missing stretches are 1", ("F",)
+    ),
+    "J": SnapshotField(lambda d: (), "-", "volume over initial volume, det F", ("J",)),
+    "cauchy_stress": SnapshotField(lambda d: (3, 3), "Pa", "Cauchy stress", ("stress",)),
+    "pressure": SnapshotField(
+        lambda d: (),
+        "Pa",
+        "pressure, minus a third of the trace of the stress",
+        ("stress",),
+        lambda stress: -np.trace(stress.T) / 3.0,
+    ),
+    "density": SnapshotField(
+        lambda d: (), "kg/m^3", "density", ("mass", "V0", "J"), lambda mass, V0, J: mass / (V0 * J)
+    ),
+    "body": SnapshotField(lambda d: (), PARTICLES["body"].unit, PARTICLES["body"].meaning, ("body",)),
+    "share": SnapshotField(lambda d: (), PARTICLES["share"].unit, PARTICLES["share"].meaning, ("share",)),
+    "volume": SnapshotField(lambda d: (), PARTICLES["V0"].unit, "volume", ("V0", "J"), lambda V0, J: V0 * J),
+    "smoothing_length": SnapshotField(
+        lambda d: (),
+        "m",
+        "smoothing length of the present configuration",
+        ("x", "h", "J"),
+        lambda x, h, J: h * np.clip(J ** (1.0 / x.shape[1]), LEAST_GROWTH, LARGEST_GROWTH),
+    ),
+    "particle": SnapshotField(lambda d: (), "-", "number of the particle in the simulation", ("particle",)),
+}
+
+#: Fields of a transported quantity, on particles that stay where they are; the exact one only where it is known.
+TRANSPORT_FIELDS = {
+    "value": SnapshotField(lambda d: (), "-", "transported quantity", ("U",)),
+    "exact": SnapshotField(lambda d: (), "-", "exact transported quantity", ("exact",)),
+    "volume": SnapshotField(lambda d: (), PARTICLES["V0"].unit, "volume", ("V0",)),
+    "smoothing_length": SnapshotField(lambda d: (), "m", "smoothing length", ("h",)),
+    **{name: FIELDS[name] for name in ("body", "particle")},
+}
+KNOWN = {**FIELDS, **TRANSPORT_FIELDS}
+
+
+def known_fields(names: Iterable[str] | None) -> tuple[str, ...] | None:
+    """The names, checked to be those of some field; None stays None, all that there will be.
+
+    Raises:
+        ValueError: a name of no field.
+    """
+    return None if names is None else tuple(_chosen(names, KNOWN))
+
+
+def chosen_fields(names: Iterable[str] | None, simulation: Recorded) -> dict[str, SnapshotField]:
+    """The fields of these names, all if None, that snapshots of ``simulation`` hold.
+
+    Raises:
+        ValueError: a name that is none of its fields.
+    """
+    if isinstance(simulation, Simulation):
+        return _chosen(names, FIELDS)
+    held = {name: field for name, field in TRANSPORT_FIELDS.items() if name != "exact" or simulation.exact is not None}
+    return _chosen(names, held)
+
+
+def _chosen(names: Iterable[str] | None, fields: dict[str, SnapshotField]) -> dict[str, SnapshotField]:
+    wanted = list(fields) if names is None else list(names)
+    unknown = [name for name in wanted if name not in fields]
+    if unknown:
+        raise ValueError(f"snapshot fields must be among {list(fields)}, got {unknown}")
+    return {name: fields[name] for name in wanted}
