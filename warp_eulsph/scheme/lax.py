@@ -92,8 +92,8 @@ class LaxStepper(LaxWendroffStepper):
         """Advance U by one step."""
         U, other = self.U, self.half
         self._refresh_if_due(U)  # k = 0, every few steps, or n
-        self._choose_dt(U)
         self._gradients(U)  # M4: ∇_k v, ∇_k F
+        self._choose_dt(U)
         self._sense(U)  # d of M9
         self._stress(U)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, U.v, 0.0)  # M5, M9
