@@ -47,6 +47,16 @@ def test_step_growth_is_bounded_and_cfl_met():
     assert steps[0] == pytest.approx(0.3 / 6 / c_p, rel=0.03)  # wave_moduli bounds c_p within 3 % at rest
 
 
+@pytest.mark.parametrize("reference", [es.Always(), es.Never()])
+@pytest.mark.parametrize("scheme", [es.Verlet(), es.LaxWendroff(), es.Lax()])
+def test_strain_in_a_step_is_bounded(scheme, reference):
+    body = square()
+    rate = 4.0 * 242.0 * 6.0 * np.array([[0.0, 1.0], [0.0, 0.0]])  # faster than waves cross a spacing
+    simulation = es.Simulation(square(velocity=body.x @ rate.T), scheme=scheme, reference=reference)
+    simulation.step()
+    assert simulation.dt * np.linalg.norm(rate) == pytest.approx(0.25 * simulation.stepper.clock.cfl, rel=1e-9)
+
+
 def test_fixed_step_is_kept():
     simulation = es.Simulation(square(), time_step=es.TimeStep(fixed=1e-5))
     simulation.step(3)

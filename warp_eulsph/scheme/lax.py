@@ -91,8 +91,8 @@ class LaxStepper(LaxWendroffStepper):
     def advance(self) -> None:
         """Advance U on the present reference."""
         U, other = self.U, self.half
-        self._choose_dt(U)
         self._gradients(U)  # M4: ∇_k v, ∇_k F
+        self._choose_dt(U)
         self._sense(U)  # d of M9
         self._stress(U)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, U.v, 0.0)  # M5, M9

@@ -209,8 +209,8 @@ class LaxWendroffStepper:
     def advance(self) -> None:
         """Advance U on the present reference; a table of contents of M8."""
         U, half = self.U, self.half
-        self._choose_dt(U)
         self._gradients(U)  # M4: ∇_k v, ∇_k F
+        self._choose_dt(U)
         self._sense(U)  # §5: d of vⁿ for both half steps, and the diffusion of Uⁿ
         self._stress(U)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, U.v, 0.0)  # M5, M9
@@ -285,7 +285,7 @@ class LaxWendroffStepper:
             self._smooth_field(self.configuration.fields.F, self.grad_F, self.smoothed_F_k)
 
     def _choose_dt(self, U: Any) -> None:
-        self.flux.wave_speeds(U.F, self.configuration.fields, self.clock.fields)
+        self.flux.wave_speeds(U.F, self.grad_v, self.configuration.fields, self.clock.fields)
         self.clock.choose()
 
     def _gradients(self, U: Any) -> None:

@@ -17,7 +17,8 @@ from .health import WELL
 class TimeStep:
     """Δt = CFL · min spacing/c, wave speeds c of the current state and spacings h_k/dilation measured in the reference.
 
-    Particles with a poor neighbourhood (an L_a beyond those of jittered corners) ask for a smaller step.
+    Particles with a poor neighbourhood (an L_a beyond those of jittered corners) ask for a smaller step, and so do
+    those that strain fast: |∇v| Δt is at most CFL/4.
 
     Args:
         cfl: Courant number; by default that of the scheme, 0.8 for Verlet and 0.4 for the others.

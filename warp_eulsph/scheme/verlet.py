@@ -66,8 +66,8 @@ class VerletStepper(LaxWendroffStepper):
     def advance(self) -> None:
         """Advance U on the present reference; a table of contents of M14."""
         U, half = self.U, self.half
-        self._choose_dt(U)
         self._velocity_gradient(U)  # M4: ∇_k vⁿ
+        self._choose_dt(U)
         self._sense(U)  # §5: d of vⁿ, and the diffusion of Uⁿ
         self._start_mean(U, half)  # vⁿ into v̄
         self._drift(U, U.v, 0.5, half)  # M14: F^{n+½}, x^{n+½}

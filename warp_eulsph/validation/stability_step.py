@@ -167,7 +167,7 @@ class Step:
             for field in (particles.h, particles.spacing):
                 field.assign(field.numpy() / volume ** (1.0 / point.dim))
             configuration.refresh(stepper.U)
-        flux.wave_speeds(stepper.U.F, configuration.fields, simulation.clock.fields)
+        flux.wave_speeds(stepper.U.F, stepper.grad_v, configuration.fields, simulation.clock.fields)
         self.speed = float(flux.fields.speed.numpy().max())
         self.dt = point.cfl / float(simulation.clock.fields.rate.numpy()[0])
         simulation.clock.option = TimeStep(fixed=self.dt)
