@@ -112,7 +112,7 @@ def test_overrides_reach_everything(tmp_path):
     case = read_case(
         CASES / "punch.toml",
         [
-            "parameters.n = 10",
+            "n = 10",
             "boundary.1.axes=[0, 1]",
             "boundary.2.region=y > 0.9",
             "reference=Never",
@@ -123,6 +123,7 @@ def test_overrides_reach_everything(tmp_path):
     )
     assert case.boundary[1].axes == [0, 1] and case.boundary[2].region.given == "y > 0.9"
     assert case.reference.make() == es.Never() and case.scheme.make() == es.LaxWendroff(dissipation=None)
+    assert read_case(CASES / "punch.toml", ["parameters.n=10"]).parameters == case.parameters
     assert case.body["block"].material.young == 20e6 and case.output.fields == ["velocity"]
 
 

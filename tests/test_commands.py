@@ -130,7 +130,6 @@ def test_wrong_input_is_two(case, tmp_path, capsys):
         (["info", str(tmp_path)], "no run in"),
         (["examples", "pnch"], "unknown example 'pnch'; did you mean 'punch'? examples are amplification, bar,"),
         ([*run, "punch"], "no case file punch; the example of that name is example:punch"),
-        ([*run, "example:punch", "-s", "n=8"], "'n' is a parameter; write parameters.n=8"),
         (["check", str(tmp_path)], "no run in"),
     ]:
         assert main(arguments) == 2

@@ -21,6 +21,10 @@ else:
     import tomli as tomllib
 
 
+# What stands at the top of a case file: an override of one word that is not among these may be a parameter's
+ENTRIES = {*Case.model_fields, *TransportCase.model_fields}
+
+
 class CaseError(ValueError):
     """A case that cannot be read.
 
@@ -39,7 +43,7 @@ def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case | Tra
     Args:
         path: the file; paths in it start from its directory.
         overrides: ``key.path=value`` strings that replace or add entries, values written as in TOML (or bare text):
-            ``parameters.n=16``, ``reference=Never``, ``boundary.0.region=y < 0.2``.
+            ``reference=Never``, ``boundary.0.region=y < 0.2``, ``parameters.n=16`` or in short ``n=16``.
 
     Raises:
         CaseError: no such file, not TOML, or any entry that is wrong; it names all of them.
@@ -109,8 +113,8 @@ def _override(data: dict[str, Any], override: str) -> str | None:
     except (ValueError, RecursionError):
         value = text.strip()
     parameters = data.get("parameters")
-    if len(keys) == 1 and isinstance(parameters, dict) and keys[0] in parameters:
-        return f"override {override!r}: {keys[0]!r} is a parameter; write parameters.{override.strip()}"
+    if len(keys) == 1 and isinstance(parameters, dict) and keys[0] in parameters and keys[0] not in ENTRIES:
+        keys.insert(0, "parameters")
     place: Any = data
     for depth, key in enumerate(keys):
         if isinstance(place, list):

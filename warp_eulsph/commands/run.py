@@ -5,7 +5,7 @@ from pathlib import Path
 
 from .options import STATUS, add_options
 
-SETTING = "change a setting, such as parameters.n=20, reference=Never or output.every=1e-3; may be given often"
+SETTING = "change a setting, such as n=20, reference=Never or output.every=1e-3; may be given often"
 
 
 def add(commands: argparse._SubParsersAction) -> None:
