@@ -28,13 +28,17 @@ LEANING = 0.01
 # nothing, run as in the balanced arrangement.
 LOADED = 0.01
 
+# T of the lean along a single tension and a single compression. In tension less loses the sheared block earlier; in
+# compression −1 is M5 alone, and beyond it strong shocks are lost; weaker ones still let particles at clamps pair up.
+ALONG_TENSION, ALONG_COMPRESSION = 1.5, -0.9
+
 # A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
 OPENED = 1.0
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Pair vectors of M4 and M5 from x̂ = x − ½(1 + λQ̂)ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
+    """Pair vectors of M4 and M5 from x̂ = x − ½(1 + λT)ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
 
     M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
     it, whatever x̂ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
@@ -42,27 +46,27 @@ class Balance:
     or closed: s_a becomes e_a, a free surface or none.
 
     What is closed exactly does not return either: particles that something has moved, stay. So in a disordered
-    arrangement under stress, Q̂ = Q/|Q|, it is corrected too far along tension and too little along compression, by up
-    to the share λ = ``lean``: either pushes back.
+    arrangement under stress it is corrected too far along tension and hardly at all along compression: either pushes
+    back.
 
     Args:
         sweeps: relaxation sweeps per refresh, from ψ = 0.
         bound: largest |x̂ − x| over the particle's spacing in the reference.
-        lean: largest λ in a reference that lasts one step, less by √k in one that lasts k; 0 closes alike in all
-            directions.
+        lean: largest share λ of that in a reference that lasts one step, less by √k in one that lasts k; 0 closes
+            alike in all directions.
     """
 
     sweeps: int = 5
     bound: float = 0.25
-    lean: float = 1.5
+    lean: float = 1.0
 
     def __post_init__(self) -> None:
         if self.sweeps < 1:
             raise ValueError(f"sweeps must be at least 1, got {self.sweeps}; correction=None balances nothing")
         if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
             raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.25 is the tested value")
-        if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 2.0):
-            raise ValueError(f"lean must be in [0, 2], got {self.lean}; 1.5 is the tested value")
+        if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 1.0):
+            raise ValueError(f"lean must be in [0, 1], got {self.lean}; 1 is the tested value")
 
     def build(self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, device: Any) -> "BalancedPairs":
         """Allocate."""
@@ -123,11 +127,12 @@ def _make_relax(space: Space, simd: bool, start: bool) -> Any:
 
 @functools.cache
 def _make_shift(space: Space) -> Any:
-    """Kernel: x̂ = x − ½(1 + λQ̂)ψ, |x̂ − x| ≤ ``bound``, λ = lean m²/(m² + LEANING²) q²/(q² + LOADED²) (M13).
+    """Kernel: x̂ = x − ½(1 + λT)ψ, |x̂ − x| ≤ ``bound``, λ = lean m²/(m² + LEANING²) q²/(q² + LOADED²) (M13).
 
-    m = |½ψ| and the bound are in spacings, q is |Q| over the modulus of pressure waves, Q̂ = Q/|Q|.
+    m = |½ψ| and the bound are in spacings, q is |Q| over the modulus of pressure waves, T = a Q̂ + b Q̂², Q̂ = Q/|Q|.
     """
     real, vec = space.real, space.vec
+    linear, quadratic = 0.5 * (ALONG_TENSION - ALONG_COMPRESSION), 0.5 * (ALONG_TENSION + ALONG_COMPRESSION)
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -148,8 +153,10 @@ def _make_shift(space: Space) -> Any:
         Q, modulus = flux.Q[a], flux.impedance[a] * flux.speed[a] * real(LOADED)
         load = wp.ddot(Q, Q)
         if load > real(0.0):
-            share *= wp.sqrt(load) / (load + modulus * modulus)
-        away += Q @ away * share
+            share *= load / (load + modulus * modulus)
+            along = Q @ away / wp.sqrt(load)
+            twice = Q @ along / wp.sqrt(load)
+            away += (along * real(linear) + twice * real(quadratic)) * share
         most = bound * spacing
         if wp.length(away) > most:
             away = away * (most / wp.length(away))
