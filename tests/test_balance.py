@@ -215,7 +215,7 @@ def test_particles_at_a_clamp_keep_apart():
 
 
 def test_strong_shocks_hold():
-    """Behind a piston at half the speed of waves: a lean beyond M5 alone along compression loses a quarter of stress."""
+    """Behind a fast piston; a lean beyond M5 alone along compression loses a quarter of the stress there."""
     driven = piston.PISTONS["compression_100"]
     simulation = piston.build(400, driven, es.Always())
     found = piston.errors(simulation, piston.measure(simulation, driven), driven)
