@@ -50,10 +50,10 @@ def results(simulation, steps):
 def assert_equal_to_round_off(portable, vector, dtype):
     """Impedances have the root of the spread of the stretches, which near F = 1 turns round-off ε into √ε.
 
-    A step moves v by a hundredth of itself or less.
+    A step moves v by a hundredth of itself or less. Ten steps round x ten times, by an ulp in either of two ways.
     """
     eps = np.finfo(np.float32 if dtype is wp.float32 else float).eps
-    bounds = {"x": 4 * eps, "F": 1e3 * eps, "internal": 1e4 * eps}
+    bounds = {"x": 10 * eps, "F": 1e3 * eps, "internal": 1e4 * eps}
     bounds |= {"dissipation": np.sqrt(eps), "v": 1e-2 * np.sqrt(eps)}
     for name, bound in bounds.items():
         assert np.abs(vector[name] - portable[name]).max() <= bound * np.abs(portable[name]).max(), name
