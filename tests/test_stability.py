@@ -65,10 +65,10 @@ def test_no_dissipation_lets_zero_energy_modes_stand():
 
 @pytest.mark.parametrize("smoothing", [None, es.LinearExact()], ids=repr)
 def test_twice_the_step_gains_energy(smoothing):
-    """At CFL 0.8 the total Lagrangian plate gains energy within five turns, with M7 and without it."""
+    """At CFL 0.8 the total Lagrangian plate gains energy within seven turns, with M7 and without it."""
     scheme, step = es.LaxWendroff(smoothing=smoothing), es.TimeStep(cfl=0.8)
-    ratios = energies(spinning_plate(16, reference=es.Never(), scheme=scheme, time_step=step), 0.3)
-    assert ratios.max() > 1.05  # more without the bound on the strain of a step
+    ratios = energies(spinning_plate(16, reference=es.Never(), scheme=scheme, time_step=step), 0.42)
+    assert ratios.max() > 1.1
 
 
 def test_surface_vectors_of_a_flat_face_alternate():

@@ -15,7 +15,7 @@ from .memory import check_memory
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.flux import Flux, check_reference
 from .scheme.graphs import StepGraphs, recordable
-from .scheme.health import UnstableError
+from .scheme.health import UnstableError, last_good
 from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff
 from .scheme.reference import Always, Configuration, ReferencePolicy
@@ -346,13 +346,10 @@ class Simulation:
             what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
         else:
             return
-        kept = "no snapshot was written"
-        if getattr(self.output, "last", None) is not None:
-            kept = f"the last good snapshot is {self.output.last}"
         raise UnstableError(
             f"unstable at t = {self.t:.8g} s, step {self.steps}: particle {particle} "
-            f"{self._where(particle, self.x)} has "
-            f"{what}; {kept}; try a smaller cfl, a finer resolution, a limiter, or a moving reference",
+            f"{self._where(particle, self.x)} has {what}; {last_good(self.output)}; "
+            "try a smaller cfl, a finer resolution, a limiter, or a moving reference",
             particle,
             self.t,
             self.steps,

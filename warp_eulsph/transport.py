@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from .schedule import SAME
-from .scheme.health import UnstableError
+from .scheme.health import UnstableError, last_good
 from .scheme.reference import Configuration
 from .scheme.scalar import ConservationLaw
 from .simulation import STEPS_BETWEEN_LOOKS, check_restorable
@@ -136,13 +136,10 @@ class Transport:
         bad = np.flatnonzero(~(np.abs(self.values) < self._most))
         if not bad.size:
             return
-        kept = "no snapshot was written"
-        if getattr(self.output, "last", None) is not None:
-            kept = f"the last good snapshot is {self.output.last}"
         where = np.array2string(self.x[bad[0]], precision=6)
         raise UnstableError(
             f"unstable at t = {self.t:.8g} s, step {self.steps}: particle {bad[0]} at x = {where} m has the value "
-            f"{self.values[bad[0]]}; {kept}; try a smaller time step than {self.time_step:.6g} s",
+            f"{self.values[bad[0]]}; {last_good(self.output)}; try a smaller time step than {self.time_step:.6g} s",
             int(bad[0]),
             before,
             self.steps,

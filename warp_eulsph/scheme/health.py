@@ -29,6 +29,12 @@ class UnstableError(RuntimeError):
         self.particle, self.time, self.step = particle, time, step
 
 
+def last_good(output: Any) -> str:
+    """What a failed run left: words on the last snapshot of ``output``, which keeps frames, or None."""
+    last = getattr(output, "last", None)
+    return "no snapshot was written" if last is None else f"the last good snapshot is {last}"
+
+
 @functools.cache
 def _make_check(space: Space) -> Any:
     real = space.real

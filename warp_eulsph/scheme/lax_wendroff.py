@@ -236,10 +236,9 @@ class LaxWendroffStepper:
 
     def refresh(self) -> None:
         """Make U the reference, shifted (M15)."""
-        self.move_reference()
-        self.configuration.lists.sum_counts()
-        self.configuration.lists.make_room()
-        self.renew_reference()
+        self._shift(self.U)
+        self.configuration.refresh(self.U)
+        self._after_refresh()
 
     def move_reference(self) -> None:
         """First part of a refresh, launches only: the reference becomes U, shifted (M15); neighbours are counted."""

@@ -181,11 +181,11 @@ class ConservationLaw:
             raise ValueError(f"initial values must have shape ({n},), got {np.shape(U)}")
         self.space = space = Space(dim, dtype, periodic is not None)
         self.device, self.scheme, self.n, self.t = wp.get_device(device), scheme, n, 0.0
-        self.flux = self.function = flux
+        self.flux = self._function = flux
         if isinstance(flux, LinearAdvection):
             if len(flux.velocity) != dim:
                 raise ValueError(f"advection velocity must have {dim} components, got {flux.velocity}")
-            self.function = _linear_flux(space, flux.velocity)
+            self._function = _linear_flux(space, flux.velocity)
         volume = np.broadcast_to(np.asarray(volume, dtype=float), n)
         if not (volume > 0.0).all():
             raise ValueError(f"volumes must be positive, got a least one of {volume.min()} m^{dim}")
@@ -241,7 +241,7 @@ class ConservationLaw:
 
     def differentiate(self, U: wp.array) -> None:
         """∇f(U) (M4), whose trace ``advance`` takes."""
-        wp.launch(_make_flux(self.space, self.function), self.n, [U, self._flux], device=self.device)
+        wp.launch(_make_flux(self.space, self._function), self.n, [U, self._flux], device=self.device)
         self.configuration.gradient(self._flux, self._grad_flux)
 
     def advance(self, base: wp.array, dt: float, out: wp.array) -> None:
