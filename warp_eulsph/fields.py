@@ -6,6 +6,7 @@ struct of a group and ``allocate`` its arrays, so that the table cannot drift fr
 """
 
 import functools
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import warp as wp
@@ -40,8 +41,9 @@ REFERENCE = {
     "balanced": Field("vec", "m", "position that M4 and M5 take pair vectors from; x unless balanced (M13)"),
     "h": Field("real", "m", "smoothing length in the reference, which follows J_k^(1/d)"),
     "V": Field("real", "m^d", "volume in the reference, det(F_k) V0"),
+    "resolution": Field("real", "1/m", "one over the spacing in the reference, more where L is large (Courant number)"),
     "L": Field("mat", "-", "gradient correction (M3), not symmetric where positions are balanced (M13)"),
-    "F": Field("mat", "-", "deformation gradient of the reference, F_k"),
+    "F": Field("mat", "-", "deformation gradient of the reference, F_k; empty where it is fixed, F_k = I"),
     "row": Field("real", "kg/m^(d+2)", "sum of m_b g_ab over the neighbours (M7)"),
     "diagonal": Field("real", "1/m^2", "sum of V_b g_ab over the neighbours, of the graph Laplacian (M13)"),
 }
@@ -77,11 +79,11 @@ def structure(space: Space, group: str) -> Any:
     return wp.struct(type(group, (), {"__annotations__": annotations, "__module__": __name__}))
 
 
-def allocate(space: Space, group: str, n: int, device: Any) -> Any:
-    """An instance of a group's struct with zeroed arrays of ``n`` particles."""
+def allocate(space: Space, group: str, n: int, device: Any, empty: Collection[str] = ()) -> Any:
+    """An instance of a group's struct with zeroed arrays of ``n`` particles, of none where the name is in ``empty``."""
     fields = structure(space, group)()
     for name, field in GROUPS[group].items():
-        setattr(fields, name, wp.zeros(n, dtype=element(space, field.kind), device=device))
+        setattr(fields, name, wp.zeros(0 if name in empty else n, dtype=element(space, field.kind), device=device))
     return fields
 
 

@@ -101,6 +101,67 @@ def symmetric_bounds(space: Space) -> Any:
 
 
 @functools.cache
+def spread_of_invariants(space: Space) -> Any:
+    """``wp.func`` deviation·√(d−1) of the eigenvalues of A Aᵀ, as in ``symmetric_bounds``, from |A|² and |cof A|²."""
+    real = space.real
+    if space.dim == 1:
+
+        @wp.func
+        def no_spread(A_A: real, C_C: real, J: real) -> real:
+            return real(0.0)
+
+        return no_spread
+
+    d, others, second = float(space.dim), float(space.dim - 1), 2.0 * space.dim / (space.dim - 1)
+
+    @wp.func
+    def spread_of_invariants(A_A: real, C_C: real, J: real) -> real:
+        of_pairs = J * J
+        if wp.static(space.dim == 3):
+            of_pairs = C_C
+        return real(others) / real(d) * wp.sqrt(wp.max(A_A * A_A - real(second) * of_pairs, real(0.0)))
+
+    return spread_of_invariants
+
+
+@functools.cache
+def stretch_bounds(space: Space) -> Any:
+    """``wp.func`` bounds (least, largest) of the squared principal stretches of A, the eigenvalues of A Aᵀ.
+
+    Those of ``symmetric_bounds``, from the invariants of the product instead of the product. (A Python number becomes a
+    constant in float32: fractions such as 1/d are divided in the kernel.)
+    """
+    real, mat, pair, d = space.real, space.mat, space.row(2), float(space.dim)
+    determinant, cof, spread_of = det(space), cofactor(space), spread_of_invariants(space)
+
+    @wp.func
+    def stretch_bounds(A: mat) -> pair:
+        C = cof(A)
+        mean = wp.ddot(A, A) * (real(1.0) / real(d))
+        spread = spread_of(wp.ddot(A, A), wp.ddot(C, C), determinant(A))
+        return pair(mean - spread, mean + spread)
+
+    return stretch_bounds
+
+
+@functools.cache
+def largest_shortening(space: Space) -> Any:
+    """``wp.func`` bound of the largest squared principal stretch of A⁻¹, without the inverse."""
+    real, mat, d = space.real, space.mat, float(space.dim)
+    determinant, cof, spread_of = det(space), cofactor(space), spread_of_invariants(space)
+
+    @wp.func
+    def largest_shortening(A: mat) -> real:
+        # A⁻¹ = (cof A)ᵀ/J and cof A⁻¹ = Aᵀ/J
+        C = cof(A)
+        rate = real(1.0) / determinant(A)
+        A_A, C_C = wp.ddot(C, C) * rate * rate, wp.ddot(A, A) * rate * rate
+        return A_A * (real(1.0) / real(d)) + spread_of(A_A, C_C, rate)
+
+    return largest_shortening
+
+
+@functools.cache
 def symmetric_eigen(space: Space) -> Any:
     """``wp.func`` (A) -> (eigenvectors as columns, eigenvalues) by cyclic Jacobi rotations."""
     dim, real, mat, vec = space.dim, space.real, space.mat, space.vec

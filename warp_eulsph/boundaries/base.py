@@ -98,6 +98,11 @@ class Bound:
     indices: np.ndarray
     recordable: bool = False
 
+    @property
+    def reads_surface(self) -> bool:
+        """Whether ``load`` reads ``state.surface``; in a fixed reference surface vectors move only if one says so."""
+        return type(self).load is not Bound.load
+
     def start(self, state: Any) -> None:
         """Prepare from the initial state, surface vectors included; called once."""
 

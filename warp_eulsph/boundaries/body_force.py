@@ -52,6 +52,8 @@ def _make_load(space: Space) -> Any:
 class BoundBodyForce(Bound):
     """Adds the weight of the particles."""
 
+    reads_surface = False
+
     def __init__(self, condition: BodyForce, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device, self.mass = assembly.space, assembly.device, assembly.particles.mass

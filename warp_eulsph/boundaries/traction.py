@@ -65,6 +65,8 @@ class BoundTraction(Bound):
         areas: initial areas (s_0·n) [m^(dim−1)] of the particles, (k,); their sum is the area of the face.
     """
 
+    reads_surface = False
+
     def __init__(self, condition: Traction, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device

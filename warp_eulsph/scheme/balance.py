@@ -9,6 +9,7 @@ import warp as wp
 
 from ..fields import arrays, neighbour_structure, structure
 from ..linalg import det, inverse
+from ..operators.correction import resolution
 from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
 from .dissipation import UpwindForces
@@ -172,15 +173,20 @@ def _make_correct(space: Space, simd: bool) -> Any:
     Where the sum has lost half of det K, in neighbourhoods that are nearly flat, L_a stays that of M3.
     """
     real, mat = space.real, space.mat
-    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+    Neighbours, resolution_of = neighbour_structure(space), resolution(space)
     sum_of, invert, determinant = outer_sum(space, simd, of_positions=True), inverse(space), det(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correct_balanced(first: int, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
+    def correct_balanced(
+        first: int, particles: Particles, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)
+    ):
         a = first + wp.tid()
         sums = sum_of(a, near, reference.x, reference.balanced)
         if determinant(sums) > real(0.5) * determinant(K[a]):
-            reference.L[a] = invert(sums)
+            L_a = invert(sums)
+            reference.L[a] = L_a
+            reference.resolution[a] = resolution_of(L_a, particles.spacing[a] * reference.h[a] / particles.h[a])
 
     return correct_balanced
 
@@ -216,4 +222,4 @@ class BalancedPairs(UpwindForces):
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
         arguments = [self.particles, reference, self.psi, self.flux, self.option.bound, self.lean]
         self._launch(_make_shift(self.space), n, arguments)
-        self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])
+        self._launch(_make_correct(self.space, simd), n, [self.particles, reference, near, configuration.K])

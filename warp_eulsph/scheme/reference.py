@@ -112,7 +112,7 @@ LEAST_GROWTH, LARGEST_GROWTH = 0.5, 2.0
 
 
 @functools.cache
-def _make_adopt(space: Space) -> Any:
+def _make_adopt(space: Space, fixed: bool) -> Any:
     State, Particles, Reference = (
         structure(space, "State"),
         structure(space, "Particles"),
@@ -124,7 +124,8 @@ def _make_adopt(space: Space) -> Any:
     def adopt(first: int, state: State, particles: Particles, reference: Reference):
         a = first + wp.tid()
         reference.x[a] = state.x[a]
-        reference.F[a] = state.F[a]
+        if wp.static(not fixed):
+            reference.F[a] = state.F[a]
         reference.balanced[a] = state.x[a]
         J = determinant(state.F[a])
         reference.V[a] = J * particles.V0[a]
@@ -184,6 +185,12 @@ def _make_defect(space: Space) -> Any:
 class Configuration:
     """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
 
+    Args:
+        box: lengths of the periodic box [m], zero where open.
+        fixed: the initial configuration stays the reference, F_k = I.
+        corrected: something changes L or the pair vectors after M3 (M10 to M13). Where nothing does and the reference
+            is fixed, arrays of the same values are one.
+
     Attributes:
         fields: struct ``Reference`` of ``fields.py``.
         lists: neighbour lists, with the pair weights g_ab.
@@ -191,13 +198,26 @@ class Configuration:
         simd: whether sums over neighbours run by SIMD kernels.
     """
 
-    def __init__(self, space: Space, weight: Weight, particles: Any, box: Any, device: Any):
+    def __init__(
+        self,
+        space: Space,
+        weight: Weight,
+        particles: Any,
+        box: Any,
+        device: Any,
+        *,
+        fixed: bool = False,
+        corrected: bool = True,
+    ):
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
+        self.fixed, self._plain = fixed, fixed and not corrected
         self.simd, self._launch = simd(device), Launcher(device)
-        self.fields = allocate(space, "Reference", n, device)
+        self.fields = allocate(space, "Reference", n, device, empty=("F",) if fixed else ())
+        if self._plain:
+            self.fields.balanced = self.fields.x
         self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device)
-        self.K = wp.zeros(n, dtype=space.mat, device=device)
+        self.K = self.fields.L if self._plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
         self._interpolations: dict[Values, Interpolation] = {}
@@ -216,23 +236,30 @@ class Configuration:
 
     def move(self, state: Any) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
-        self._launch(_make_adopt(self.space), len(state.x), [state, self.particles, self.fields])
+        self._launch(_make_adopt(self.space, self.fixed), len(state.x), [state, self.particles, self.fields])
         self.lists.count_neighbours(self.fields.x)
 
     def renew(self) -> None:
         """Last part of a refresh, launches only: the neighbours, pair weights and corrections (M3)."""
         self.lists.fill(self.fields.x)
         self._weigh()
-        self._launch(make_correct(self.space), len(self.K), [self.K, self.fields, self.poor])
+        self._correct()
 
     def evolving(self) -> dict[str, wp.array]:
         """The reference's arrays by name: what a checkpoint must hold; ``rebuild`` derives the rest from them."""
-        return arrays(self.fields, "Reference")
+        shared = ("Reference.balanced", "Reference.F") if self._plain else ("Reference.F",) if self.fixed else ()
+        return {name: array for name, array in arrays(self.fields, "Reference").items() if name not in shared}
 
     def rebuild(self) -> None:
         """Neighbours, pair weights, K_a (M3) and interpolations of the positions, volumes and h in ``fields``."""
         self.lists.build(self.fields.x)
         self._weigh()
+        if self.K is self.fields.L:
+            self._correct()
+
+    def _correct(self) -> None:
+        arguments = [self.K, self.particles, self.fields, self.poor]
+        self._launch(make_correct(self.space), len(self.K), arguments)
 
     def _weigh(self) -> None:
         pair_sums = (make_pair_sums_simd if self.simd else make_pair_sums)(self.weight, self.space)
