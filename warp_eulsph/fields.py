@@ -41,7 +41,9 @@ REFERENCE = {
     "balanced": Field("vec", "m", "position that M4 and M5 take pair vectors from; x unless balanced (M13)"),
     "h": Field("real", "m", "smoothing length in the reference, which follows J_k^(1/d)"),
     "V": Field("real", "m^d", "volume in the reference, det(F_k) V0"),
-    "resolution": Field("real", "1/m", "one over the spacing in the reference, more where L is large (Courant number)"),
+    "resolution": Field(
+        "real", "1/m", "of a fixed reference, 1/spacing, more where L is large: for the Courant number"
+    ),
     "L": Field("mat", "-", "gradient correction (M3), not symmetric where positions are balanced (M13)"),
     "F": Field("mat", "-", "deformation gradient of the reference, F_k; empty where it is fixed, F_k = I"),
     "row": Field("real", "kg/m^(d+2)", "sum of m_b g_ab over the neighbours (M7)"),

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import warp as wp
 
+from ..linalg import reciprocal_cube_root
 from ..space import Space
 
 
@@ -52,34 +53,12 @@ def largest_eigenvalue(real: type) -> Any:
 
 @functools.cache
 def isochoric(real: type) -> Any:
-    """``wp.func`` J^(−2/3), NaN unless J > 0.
+    """``wp.func`` J^(−2/3), NaN unless J > 0."""
+    root = reciprocal_cube_root(real)
 
-    On the CPU by the reciprocal cube root y: a guess from the bits of J, off by 3 %, then twice
-    y ← y (1 − c)^(−1/3), c = 1 − J y³, to third order in c; two thirds of a unit in the last place are left. As a call
-    of ``pow``, in the midst of matrices held in registers, it took half the time of the kernels of stress and energy.
-    """
-    word, guess = {wp.float64: ("long long", "0x553ee96246f67eef"), wp.float32: ("int", "0x54a1f5bd")}[real]
-    name = "double" if real is wp.float64 else "float"
-
-    @wp.func_native(f"""
-    typedef {name} T;
-    #if defined(__CUDA_ARCH__)
-    T y = {"rcbrt" if real is wp.float64 else "rcbrtf"}(J);
-    #else
-    unsigned {word} bits;
-    __builtin_memcpy(&bits, &J, sizeof(T));
-    bits = {guess} - bits / 3;
-    T y;
-    __builtin_memcpy(&y, &bits, sizeof(T));
-    #pragma unroll
-    for (int round = 0; round < 2; ++round) {{
-        const T c = 1 - (J * y) * (y * y);
-        y += y * c * (T(1.0 / 3.0) + c * (T(2.0 / 9.0) + c * T(14.0 / 81.0)));
-    }}
-    #endif
-    return J > 0 ? y * y : T(__builtin_nan(""));
-    """)
-    def isochoric(J: real) -> real: ...
+    @wp.func
+    def isochoric(J: real) -> real:
+        return root(J) * root(J)
 
     return isochoric
 

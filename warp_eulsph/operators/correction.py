@@ -16,11 +16,6 @@ from ..weights.base import pair_weight
 # keeps less than this share, differences carry no usable slope and the gradient's component there is set to zero.
 CUTOFF = 0.02
 
-# Largest eigenvalue of L_a that the Courant number allows for: 3.7 in corners of 2-D lattices, 4.7 in 3-D ones. The
-# highest frequency of M5 on M4 grows with its root, so that a particle with a poorer neighbourhood asks for a smaller
-# step: without this the punch at 40² fails.
-LOPSIDED = 4.0
-
 
 @functools.cache
 def make_pair_sums(weight: Weight, space: Space) -> Any:
@@ -172,39 +167,17 @@ def corrected_inverse(space: Space) -> Any:
 
 
 @functools.cache
-def resolution(space: Space) -> Any:
-    """``wp.func`` what the Courant number counts by [1/m], from L_a and the spacing in the reference [m]."""
-    real, mat, bounds = space.real, space.mat, symmetric_bounds(space)
-
-    @wp.func
-    def resolution(L: mat, spacing: real) -> real:
-        lopsided = bounds((L + wp.transpose(L)) * real(0.5))[1] / real(LOPSIDED)
-        return wp.sqrt(wp.max(lopsided, real(1.0))) / spacing
-
-    return resolution
-
-
-@functools.cache
 def make_correct(space: Space) -> Any:
     """Kernel: L_a from K_a (M3), which may be the same array; ``poor``: directions in which a particle fell back."""
     real, mat, dim = space.real, space.mat, space.dim
-    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+    Reference = structure(space, "Reference")
     invert, bounds, eigen = corrected_inverse(space), symmetric_bounds(space), symmetric_eigen(space)
-    resolution_of = resolution(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correct(
-        first: int,
-        K: wp.array(dtype=mat),
-        particles: Particles,
-        reference: Reference,
-        poor: wp.array(dtype=wp.int32),
-    ):
+    def correct(first: int, K: wp.array(dtype=mat), reference: Reference, poor: wp.array(dtype=wp.int32)):
         a = first + wp.tid()
         K_a = mat(K[a])
-        L_a = invert(K_a)
-        reference.L[a] = L_a
-        reference.resolution[a] = resolution_of(L_a, particles.spacing[a] * reference.h[a] / particles.h[a])
+        reference.L[a] = invert(K_a)
         lacking = int(0)
         if bounds(K_a)[0] < real(CUTOFF):
             _, values = eigen(K_a)

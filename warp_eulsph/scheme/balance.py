@@ -9,7 +9,6 @@ import warp as wp
 
 from ..fields import arrays, neighbour_structure, structure
 from ..linalg import det, inverse
-from ..operators.correction import resolution
 from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
 from .dissipation import UpwindForces
@@ -78,13 +77,16 @@ class Balance:
 def _make_renew(space: Space) -> Any:
     """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13)."""
     real, vec = space.real, space.vec
-    face = float(space.dim - 1) / float(space.dim)
-    Reference = structure(space, "Reference")
+    Reference, dim = structure(space, "Reference"), space.dim
+    most = OPENED**dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def renew(first: int, reference: Reference, defect: wp.array(dtype=vec), surface: wp.array(dtype=vec)):
         a = first + wp.tid()
-        if wp.length(defect[a]) > real(OPENED) * wp.pow(reference.V[a], real(face)):
+        opening = wp.length(defect[a])  # |d|ᵈ/Vᵈ⁻¹, the d-th power of |d| over the face: no root to take
+        for _ in range(wp.static(dim - 1)):
+            opening *= wp.length(defect[a]) / reference.V[a]
+        if opening > real(most):
             surface[a] = surface[a] + defect[a]
             defect[a] = vec()
 
@@ -173,20 +175,15 @@ def _make_correct(space: Space, simd: bool) -> Any:
     Where the sum has lost half of det K, in neighbourhoods that are nearly flat, L_a stays that of M3.
     """
     real, mat = space.real, space.mat
-    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
-    Neighbours, resolution_of = neighbour_structure(space), resolution(space)
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     sum_of, invert, determinant = outer_sum(space, simd, of_positions=True), inverse(space), det(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correct_balanced(
-        first: int, particles: Particles, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)
-    ):
+    def correct_balanced(first: int, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
         a = first + wp.tid()
         sums = sum_of(a, near, reference.x, reference.balanced)
         if determinant(sums) > real(0.5) * determinant(K[a]):
-            L_a = invert(sums)
-            reference.L[a] = L_a
-            reference.resolution[a] = resolution_of(L_a, particles.spacing[a] * reference.h[a] / particles.h[a])
+            reference.L[a] = invert(sums)
 
     return correct_balanced
 
@@ -222,4 +219,4 @@ class BalancedPairs(UpwindForces):
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
         arguments = [self.particles, reference, self.psi, self.flux, self.option.bound, self.lean]
         self._launch(_make_shift(self.space), n, arguments)
-        self._launch(_make_correct(self.space, simd), n, [self.particles, reference, near, configuration.K])
+        self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])

@@ -12,7 +12,7 @@ from ..fields import allocate, clock_structure, structure
 from ..linalg import det, inverse, largest_shortening
 from ..materials import Law, Material
 from ..space import Space
-from .reference import Always, Configuration, Every, ReferencePolicy
+from .reference import Always, Configuration, Every, ReferencePolicy, resolution
 
 
 @functools.cache
@@ -59,7 +59,7 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Clock, Constants, dim = clock_structure(space), law.Constants, float(space.dim)
     invert, moduli, shortening_of = inverse(space), law.wave_moduli, largest_shortening(space)
-    raise_rate = raise_to(real)
+    raise_rate, resolution_of = raise_to(real), resolution(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
@@ -86,7 +86,11 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
         flux.speed[a] = speed
         flux.impedance[a] = rho_k * speed
         flux.shear_impedance[a] = rho_k * shear_speed
-        rate = speed * reference.resolution[a]
+        rate = speed
+        if wp.static(fixed):
+            rate *= reference.resolution[a]
+        else:
+            rate *= resolution_of(a, particles, reference)
         # |∇v G⁻¹| ≤ |∇v| |G⁻¹| and, of the bound, |G⁻¹|² ≤ d · shortening: seldom is more than that asked for
         strain_rate = real(STRAIN) * rate
         if wp.ddot(grad_v[a], grad_v[a]) * shortening * real(dim) > strain_rate * strain_rate:

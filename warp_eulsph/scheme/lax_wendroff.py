@@ -303,6 +303,7 @@ class LaxWendroffStepper:
         self._refresh_derived()
 
     def _refresh_derived(self) -> None:
+        self.configuration.resolve()
         if self.limiter is not None:
             self.limiter.refresh()
         if self.smoothed_F_k is not self.configuration.fields.F:
