@@ -154,7 +154,7 @@ def _take(commands: Iterator[Any]) -> None:
 
 def _ranges(n: int, each: int = 1) -> tuple[tuple[int, int], ...]:
     """[begin, end) of the ranges that n blocks of ``each`` particles are split into."""
-    count = 1 if _threads == 1 else min(_threads * RANGES_PER_THREAD, n * each // LEAST_RANGE)
+    count = 1 if _threads == 1 else min(_threads * RANGES_PER_THREAD, n * each // LEAST_RANGE, n)
     if count <= 1:
         return ((0, n),)
     ends = [n * k // count for k in range(count + 1)]
