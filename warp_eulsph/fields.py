@@ -51,7 +51,7 @@ REFERENCE = {
 }
 FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
-    "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5)"),
+    "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
     "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
     "impedance": Field("real", "kg/(m^2 s)", "density times pressure-wave speed, both measured in the reference (M9)"),
     "shear_impedance": Field(

@@ -122,6 +122,10 @@ class UpwindForces(Stabiliser):
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Nothing to prepare: M9 needs the lists only."""
 
+    def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
+        """The portable kernels do, the SIMD pass makes its own."""
+        return sensed or not configuration.simd
+
     def compute(
         self,
         configuration: Configuration,
@@ -133,7 +137,7 @@ class UpwindForces(Stabiliser):
         forces: Any,
     ) -> None:
         """Internal force (M5) and dissipation (M9) into ``forces``."""
-        if configuration.simd and sensor is None:
+        if not self.takes_dual(configuration, sensor is not None):
             if self._in_one_pass is None:
                 self._in_one_pass = PairForces(self.space, len(v), self.device)
             self._in_one_pass.compute(configuration, flux, v, grad_v, epsilon, forces)

@@ -29,7 +29,7 @@ def stress_in_reference(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_flux(space: Space, law: Law, fixed: bool) -> Any:
+def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> Any:
     mat = space.mat
     Reference, Flux, Constants = structure(space, "Reference"), structure(space, "Flux"), law.Constants
     P_of, Q_of = law.stress, stress_in_reference(space, law)
@@ -43,7 +43,8 @@ def _make_flux(space: Space, law: Law, fixed: bool) -> Any:
         else:
             Q = Q_of(F[a], reference.F[a], c)
         flux.Q[a] = Q
-        flux.Pi[a] = Q @ wp.transpose(reference.L[a])
+        if wp.static(dual):
+            flux.Pi[a] = Q @ wp.transpose(reference.L[a])
 
     return compute_flux
 
@@ -186,7 +187,7 @@ class Flux:
             history = wp.zeros(count, dtype=space.row(law.history), device=device) if law.history else None
             self.parts.append(_Part(first, count, law, constants, history))
             first += count
-        self.fields = allocate(space, "Flux", first, device)
+        self.fields = allocate(space, "Flux", first, device, empty=("Pi",))
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.histories = [part.history for part in self.parts]
 
@@ -194,11 +195,16 @@ class Flux:
         """The histories of the materials that have one, by body; what a checkpoint must hold."""
         return {f"Flux.history.{i}": history for i, history in enumerate(self.histories) if history is not None}
 
+    def keep_dual(self) -> None:
+        """Have ``compute`` write Π too, for forces that take it from the array (M5)."""
+        if not len(self.fields.Pi):
+            self.fields.Pi = wp.zeros_like(self.fields.Q)
+
     def compute(self, F: wp.array, configuration: Configuration) -> None:
-        """Q and Π = Q L of the deformation gradients ``F`` (M1, M5)."""
+        """Q of the deformation gradients ``F`` (M1), and Π = Q Lᵀ (M5) if it is kept."""
         for part in self.parts:
             arguments = [F, configuration.fields, part.constants, self.fields]
-            kernel = _make_flux(self.space, part.law, configuration.fixed)
+            kernel = _make_flux(self.space, part.law, configuration.fixed, len(self.fields.Pi) > 0)
             self._launch(kernel, part.size, arguments, part.first)
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:

@@ -205,6 +205,9 @@ class LaxWendroffStepper:
         self.stabiliser: Stabiliser = UpwindForces(space, device)
         if is_corrected(options, policy, surface_given):
             self.stabiliser = options.correction.build(space, particles, flux, policy, device)
+        sensed = options.dissipation is not None and options.dissipation.sensor is not None
+        if self.stabiliser.takes_dual(configuration, sensed):
+            flux.keep_dual()
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:
             self.limiter = options.limiter.build(space, particles, configuration, device)

@@ -323,7 +323,13 @@ class Configuration:
         self._launch(kernel, len(f), [self.fields, self.near, f, out])
 
     def divergence(self, Pi: wp.array, out: wp.array) -> None:
-        """``out`` ← −T, the dual divergence (M5) of Π = Q Lᵀ, (n,) of vec."""
+        """``out`` ← −T, the dual divergence (M5) of Π = Q Lᵀ, (n,) of vec.
+
+        Raises:
+            ValueError: a Π that was not kept.
+        """
+        if len(Pi) != len(out):
+            raise ValueError(f"Pi must be of {len(out)} particles, got {len(Pi)}; Flux.keep_dual() has it computed")
         self._launch(make_divergence(self.space, self.simd), len(out), [self.fields, self.near, Pi, out])
 
     def defect(self, surface: wp.array, out: wp.array) -> None:

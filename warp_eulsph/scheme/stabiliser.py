@@ -15,6 +15,10 @@ class Stabiliser(ABC):
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Prepare for a new reference."""
 
+    def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
+        """Whether ``compute``, with a sensor or without, takes Π from the array of the flux (M5)."""
+        return True
+
     def evolving(self) -> dict[str, wp.array]:
         """Arrays by name that live from step to step: what a checkpoint must hold."""
         return {}
