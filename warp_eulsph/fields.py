@@ -89,6 +89,11 @@ def allocate(space: Space, group: str, n: int, device: Any, empty: Collection[st
     return fields
 
 
+def repeated(one: wp.array, n: int) -> wp.array:
+    """An array of ``n`` elements, to be read only, that all are the one of ``one``, whose memory they take."""
+    return wp.array(ptr=one.ptr, shape=(n,), strides=(0,), dtype=one.dtype, device=one.device)
+
+
 def arrays(fields: Any, group: str) -> dict[str, wp.array]:
     """The arrays of an instance of a group's struct by name: ``State.x`` and so on."""
     return {f"{group}.{name}": getattr(fields, name) for name in GROUPS[group]}

@@ -99,9 +99,14 @@ class Bound:
     recordable: bool = False
 
     @property
-    def reads_surface(self) -> bool:
-        """Whether ``load`` reads ``state.surface``; in a fixed reference surface vectors move only if one says so."""
+    def loads(self) -> bool:
+        """Whether ``load`` adds forces."""
         return type(self).load is not Bound.load
+
+    @property
+    def reads_surface(self) -> bool:
+        """Whether ``load`` reads ``state.surface``; where the reference is fixed they move for those that do."""
+        return self.loads
 
     def start(self, state: Any) -> None:
         """Prepare from the initial state, surface vectors included; called once."""

@@ -115,6 +115,8 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
 class UpwindForces(Stabiliser):
     """M9 alone, for references that need no correction."""
 
+    corrects = False
+
     def __init__(self, space: Space, device: Any):
         self.space, self.device, self._launch = space, device, Launcher(device)
         self._in_one_pass: PairForces | None = None

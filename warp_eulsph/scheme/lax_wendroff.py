@@ -9,7 +9,7 @@ import warp as wp
 
 from ..boundaries import Bound
 from ..execution import Launcher
-from ..fields import allocate, arrays, clock_structure, structure
+from ..fields import allocate, arrays, clock_structure, repeated, structure
 from ..linalg import cofactor, det
 from ..space import Space
 from .balance import Balance
@@ -193,7 +193,7 @@ class LaxWendroffStepper:
             self.half.surface = U.surface
         self.particles, self.flux, self.configuration = particles, flux, configuration
         self.policy, self.clock, self.conditions = policy, clock, conditions
-        self.forces = allocate(space, "Forces", n, device)
+        self.forces = allocate(space, "Forces", n, device, empty=("correction", "external"))
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         self.shifter: Shifter | None = None
         if options.shifting is not None and not policy.fixed:
@@ -205,6 +205,11 @@ class LaxWendroffStepper:
         self.stabiliser: Stabiliser = UpwindForces(space, device)
         if is_corrected(options, policy, surface_given):
             self.stabiliser = options.correction.build(space, particles, flux, policy, device)
+        self._zero, self.loaded = wp.zeros(1, dtype=space.vec, device=device), any(c.loads for c in conditions)
+        # Forces that are always zero take the memory of one
+        for name, there in (("correction", self.stabiliser.corrects), ("external", self.loaded)):
+            force = wp.zeros(n, dtype=space.vec, device=device) if there else repeated(self._zero, n)
+            setattr(self.forces, name, force)
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         if self.stabiliser.takes_dual(configuration, sensed):
             flux.keep_dual()
@@ -220,7 +225,7 @@ class LaxWendroffStepper:
         self._impose(U, 0.0)
         configuration.refresh(U)
         if not surface_given:
-            configuration.defect(self.forces.external, U.surface)  # s_a = e_a at the start (M10), less nothing yet
+            configuration.defect(self.forces.free_v, U.surface)  # s_a = e_a at the start (M10), less nothing yet
         for condition in conditions:
             condition.start(U)
         self._after_refresh()
@@ -341,7 +346,8 @@ class LaxWendroffStepper:
             if options.dissipation.sensor is not None:
                 d = self.sensors[options.dissipation.sensor].d
         self.stabiliser.compute(configuration, self.flux.fields, v, self.grad_v, epsilon, d, forces)
-        forces.external.zero_()
+        if self.loaded:
+            forces.external.zero_()
         for condition in self.conditions:
             condition.load(state, self.clock.fields, fraction, forces.external)
 

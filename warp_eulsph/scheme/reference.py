@@ -276,6 +276,7 @@ class Configuration:
         self.lists.fill(self.fields.x)
         self._weigh()
         self._correct()
+        self._settle()
 
     def evolving(self) -> dict[str, wp.array]:
         """The reference's arrays by name: what a checkpoint must hold; ``rebuild`` derives the rest from them."""
@@ -293,6 +294,11 @@ class Configuration:
         self._weigh()
         if self.K is self.fields.L:
             self._correct()
+        self._settle()
+
+    def _settle(self) -> None:
+        if self.fixed:
+            self.lists.release()
 
     def _correct(self) -> None:
         arguments = [self.K, self.fields, self.poor]

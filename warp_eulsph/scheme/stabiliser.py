@@ -1,7 +1,7 @@
 """What keeps the sums of a reference stable: dissipation, and the correction of what the arrangement gets wrong."""
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
@@ -10,6 +10,9 @@ from .reference import Configuration
 
 class Stabiliser(ABC):
     """The stabilising forces at work on one set of particles."""
+
+    #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
+    corrects: ClassVar[bool] = True
 
     @abstractmethod
     def refresh(self, configuration: Configuration, state: Any) -> None:
