@@ -35,9 +35,7 @@ def test_estimate_is_near_what_is_allocated(dim, dtype, reference, simd, monkeyp
 
 def test_a_run_that_does_not_fit_is_refused_with_the_number(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda device: 1_000_000)
-    with pytest.raises(
-        MemoryError, match=r"8000 particles take about 2\d\d\d bytes each, 0.0197 GB, and 0.001 GB are"
-    ):
+    with pytest.raises(MemoryError, match=r"8000 particles take about 2\d\d\d bytes each, 0.0197 GB, and 0.001 GB are"):
         es.Simulation(block(3))
 
 
