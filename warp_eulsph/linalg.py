@@ -75,7 +75,7 @@ def reciprocal_cube_root(real: type) -> Any:
         y += y * c * (T(1.0 / 3.0) + c * (T(2.0 / 9.0) + c * T(14.0 / 81.0)));
     }}
     #endif
-    return x > 0 ? y : T(__builtin_nan(""));
+    return x > 0 ? y : T(NAN);
     """)
     def reciprocal_cube_root(x: real) -> real: ...
 
