@@ -221,7 +221,8 @@ class NeighbourLists:
             self._equip()
         self.count_neighbours(x)
         self.sum_counts()
-        self.make_room()
+        if self.pairs > self.capacity:  # not where the rows of before are found again, in whatever order
+            self.make_room()
         self.fill(x)
 
     def count_neighbours(self, x: wp.array) -> None:
