@@ -191,7 +191,7 @@ class NeighbourLists:
         self.count = wp.zeros(n + 1, dtype=wp.int32, device=device)
 
     def release(self) -> None:
-        """Free what a search needs besides the lists; the next ``build`` allocates it again."""
+        """Free what a search needs besides the lists; the next search allocates it again."""
         self._launch.forget()
         self.cells = self.grid = self.padded = self.count = None
 
@@ -217,8 +217,6 @@ class NeighbourLists:
 
     def build(self, x: wp.array) -> None:
         """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.w`` is left to be computed."""
-        if self.padded is None:
-            self._equip()
         self.count_neighbours(x)
         self.sum_counts()
         if self.pairs > self.capacity:  # not where the rows of before are found again, in whatever order
@@ -228,6 +226,8 @@ class NeighbourLists:
     def count_neighbours(self, x: wp.array) -> None:
         """How many neighbours each particle has in ``x``; launches only, as is all of ``build`` but ``make_room``."""
         n = len(x)
+        if self.padded is None:
+            self._equip()
         if not self._in_cells or self.space.periodic:
             self._h_max.zero_()
             self._launch(_make_longest(self.space), n, [self.h, self._h_max])
