@@ -178,6 +178,10 @@ class Diagnostics:
 
     def jacobians(self, state: Any) -> np.ndarray:
         """det F of each particle, (n,)."""
+        return self.volume_ratios(state).numpy()
+
+    def volume_ratios(self, state: Any) -> wp.array:
+        """det F of each particle, (n,), on the device."""
         found = wp.empty(len(state.F), dtype=self.space.real, device=self.device)
         wp.launch(_make_jacobian(self.space), len(found), [state.F, found], device=self.device)
-        return found.numpy()
+        return found
