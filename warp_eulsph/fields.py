@@ -34,7 +34,9 @@ STATE = {
     "x": Field("vec", "m", "position"),
     "v": Field("vec", "m/s", "velocity"),
     "F": Field("mat", "-", "deformation gradient from the initial configuration, as the material carries it"),
-    "surface": Field("vec", "m^(d-1)", "outward area vector s_a, zero inside the body, moved by Nanson's rule (M10)"),
+    "surface": Field(
+        "vec", "m^(d-1)", "outward area vector s_a, zero inside the body, moved by Nanson's rule (M10) where it is read"
+    ),
 }
 REFERENCE = {
     "x": Field("vec", "m", "position in the reference"),
