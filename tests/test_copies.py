@@ -25,9 +25,9 @@ class LateCopies(copies.Copies):
         self.taken, self.arrived, self.released = 0, [], 0
         made.append(self)
 
-    def take(self, array):
+    def take(self, array, chosen=copies.ALL):
         if isinstance(array, np.ndarray):
-            return super().take(array)
+            return super().take(array, chosen)
         present, values = np.array(array.numpy()), np.full_like(array.numpy(), -1)
         self.taken += 1
 
@@ -39,7 +39,7 @@ class LateCopies(copies.Copies):
             self.released += 1
             values.fill(-2)
 
-        return copies.Copy(values, arrive, give_back=give_back)
+        return copies.Copy(values, chosen, arrive, give_back=give_back)
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_a_copy_on_the_cpu_is_there_at_once_and_stays():
 
 
 def test_values_cannot_be_had_before_they_arrive():
-    copy = copies.Copy(np.zeros(1), object())
+    copy = copies.Copy(np.zeros(1), arrived=object())
     assert copy.on_its_way
     with pytest.raises(RuntimeError, match="before they arrived"):
         _ = copy.values

@@ -13,11 +13,17 @@ import numpy as np
 import warp as wp
 
 
+#: Which elements of an array are copied.
+Chosen = slice | np.ndarray
+ALL = slice(None)
+
+
 class Copy:
     """Values on their way to the host.
 
     Args:
         values: where they will be.
+        chosen: those that are asked for.
         arrived: event of their arrival; None if they are there.
         held: what must live until then.
         give_back: called when nobody needs ``values`` any more.
@@ -26,11 +32,13 @@ class Copy:
     def __init__(
         self,
         values: np.ndarray,
+        chosen: Chosen = ALL,
         arrived: wp.Event | None = None,
         held: wp.array | None = None,
         give_back: Callable[[], object] | None = None,
     ):
-        self._values, self._arrived, self._held, self._give_back = values, arrived, held, give_back
+        self._values, self._chosen, self._arrived = values, chosen, arrived
+        self._held, self._give_back = held, give_back
 
     @property
     def on_its_way(self) -> bool:
@@ -45,10 +53,10 @@ class Copy:
 
     @property
     def values(self) -> np.ndarray:
-        """The values, which must have arrived; not to be used after ``release``."""
+        """The values asked for, which must have arrived; not to be used after ``release``."""
         if self.on_its_way:
             raise RuntimeError("copied values were asked for before they arrived; wait() first")
-        return self._values
+        return self._values[self._chosen]
 
     def release(self) -> None:
         """Leave the memory to later copies."""
@@ -65,15 +73,15 @@ class Copies:
         self._stream = wp.Stream(self.device) if self.device.is_cuda else None
         self._free: defaultdict[tuple[Any, ...], list[wp.array]] = defaultdict(list)
 
-    def take(self, array: wp.array | np.ndarray) -> Copy:
-        """A copy of the present values; an array of the host is taken as it is."""
+    def take(self, array: wp.array | np.ndarray, chosen: Chosen = ALL) -> Copy:
+        """A copy of the present values of some elements; an array of the host is taken as it is."""
         if isinstance(array, np.ndarray):
-            return Copy(array)
+            return Copy(array[chosen])
         if self._stream is None:
-            return Copy(np.array(array.numpy()))
+            return Copy(np.array(array.numpy()[chosen]))
         free = self._free[array.shape, array.dtype]
         host = free.pop() if free else wp.empty(array.shape, dtype=array.dtype, device="cpu", pinned=True)
         staged = wp.clone(array)
         self._stream.wait_stream(self.device.stream)
         wp.copy(host, staged, stream=self._stream)
-        return Copy(host.numpy(), self._stream.record_event(), staged, lambda: free.append(host))
+        return Copy(host.numpy(), chosen, self._stream.record_event(), staged, lambda: free.append(host))

@@ -42,8 +42,7 @@ class Frame:
 
     Attributes:
         time: [s]. step: steps taken. dim: dimension.
-        fields: to write, by name. copies: what they are made of, of all particles, with the positions ``x`` [m].
-        chosen: the particles that are written.
+        fields: to write, by name. copies: what they are made of, (n, …) each, with the positions ``x`` [m].
     """
 
     time: float
@@ -51,7 +50,6 @@ class Frame:
     dim: int
     fields: Mapping[str, SnapshotField]
     copies: Mapping[str, Copy]
-    chosen: slice | np.ndarray
 
     @property
     def on_its_way(self) -> bool:
@@ -71,7 +69,7 @@ class Frame:
     @functools.cached_property
     def sources(self) -> dict[str, np.ndarray]:
         """What the fields are made of, (n, …) each."""
-        return {name: copy.values[self.chosen] for name, copy in self.copies.items()}
+        return {name: copy.values for name, copy in self.copies.items()}
 
     @property
     def x(self) -> np.ndarray:
@@ -94,8 +92,8 @@ def collect(
     fields, chosen = chosen_fields(names, simulation), slice(None) if particles is None else particles
     needed = dict.fromkeys(["x", *(source for field in fields.values() for source in field.sources)])
     taken = Copies(simulation.device) if copies is None else copies
-    sources = {name: taken.take(SOURCES[name](simulation)) for name in needed}
-    frame = Frame(simulation.t, simulation.steps, simulation.space.dim, fields, sources, chosen)
+    sources = {name: taken.take(SOURCES[name](simulation), chosen) for name in needed}
+    frame = Frame(simulation.t, simulation.steps, simulation.space.dim, fields, sources)
     if copies is None:
         frame.wait()
     return frame
