@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-
 #: Which elements of an array are copied.
 Chosen = slice | np.ndarray
 ALL = slice(None)
