@@ -29,7 +29,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) ->
     reals = sum(sizes[field.kind] for group in GROUPS.values() for field in group.values())
     reals += sum(sizes[field.kind] for field in GROUPS["State"].values())  # the half step
     reals += 2 * d * d + 3 + d + (3 * d if moving else 0)  # ∇v, K; places, old v; M13
-    ints, doubles = 4, 16  # body, lists; books, momenta
+    ints, doubles = 5, 16  # body, number, lists; books, momenta
     if simd(device):
         reals += LANES * (2 + 2 * d) + 5
         ints += 6

@@ -52,6 +52,8 @@ def _make_load(space: Space) -> Any:
 class BoundBodyForce(Bound):
     """Adds the weight of the particles."""
 
+    sortable = True
+
     def __init__(self, condition: BodyForce, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device, self.mass = assembly.space, assembly.device, assembly.particles.mass
@@ -60,7 +62,7 @@ class BoundBodyForce(Bound):
         self.recordable = self.values.recordable
         self.X: wp.array | None = None
         if condition.material:
-            self.X = wp.array(assembly.X.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
+            self.X = assembly.order.carry(assembly.X, self.space.vec)
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x if self.X is None else self.X, clock, fraction)

@@ -51,6 +51,8 @@ def _make_load(space: Space) -> Any:
 class BoundPressure(Bound):
     """Adds the pressure force."""
 
+    sortable = True
+
     def __init__(self, condition: Pressure, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device

@@ -65,6 +65,8 @@ class BoundTraction(Bound):
         areas: initial areas (s_0·n) [m^(dim−1)] of the particles, (k,); their sum is the area of the face.
     """
 
+    sortable = True
+
     def __init__(self, condition: Traction, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device
@@ -75,7 +77,7 @@ class BoundTraction(Bound):
         self.areas = wp.zeros(len(self.indices), dtype=self.space.real, device=self.device)
 
     def start(self, state: Any) -> None:
-        areas = state.surface.numpy()[self.indices] @ self.normal
+        areas = state.surface.numpy()[self.values.indices.numpy()] @ self.normal
         self.areas.assign(areas.astype(self.space.numpy))
         if areas.min() > -0.01 * np.abs(areas).max():
             log.warning(

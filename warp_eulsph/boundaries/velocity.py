@@ -51,6 +51,8 @@ def _make_impose(space: Space) -> Any:
 class BoundVelocity(Bound):
     """Writes the value into the velocity; ``who`` is the condition that errors name."""
 
+    sortable = True
+
     def __init__(self, condition: Velocity, assembly: Assembly, who: str):
         self.space, self.device = assembly.space, assembly.device
         self.indices = assembly.select(condition.region, condition.body, who)

@@ -206,7 +206,8 @@ class NeighbourLists:
         """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.w`` is left to be computed."""
         self.count_neighbours(x)
         self.sum_counts()
-        self.make_room()
+        if self.pairs > self.capacity:  # not where the rows of before are found again, in whatever order
+            self.make_room()
         self.fill(x)
 
     def count_neighbours(self, x: wp.array) -> None:

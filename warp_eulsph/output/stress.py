@@ -76,4 +76,4 @@ def cauchy_stress(simulation: Simulation) -> np.ndarray:
     sigma = stresses(space, len(F), simulation.device)
     for body in simulation.bodies:
         body_stress(space, body.material, simulation.ranges[body.name], F, sigma)
-    return sigma.numpy().copy()
+    return simulation.order.by_number(sigma.numpy())
