@@ -27,6 +27,31 @@ def begin(directory, until):
     record(simulation, directory, until, recording(simulation, checkpoint=0.02), resume=True)
 
 
+def killed_until_done(begin, kills, rng=None, after=lambda: None):
+    """Run ``begin`` in children, the first ``kills`` of them killed at random moments, until one ends; how many were.
+
+    ``after`` is called after each.
+    """
+    rng, killed = rng or random.Random(2), 0
+    while True:
+        child = os.fork()
+        if child == 0:  # a copy of this process, with its kernels loaded
+            try:
+                begin()
+            except BaseException:
+                os._exit(1)
+            os._exit(0)
+        time.sleep(rng.uniform(0.01, 0.25))
+        if killed < kills:
+            os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        after()
+        if not os.WIFSIGNALED(status):
+            assert os.WEXITSTATUS(status) == 0, "the resumed run failed"
+            return killed
+        killed += 1
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no fork")
 def test_thirty_kills_at_random_moments_lose_nothing(tmp_path):
     begin(tmp_path / "whole", LONG)
@@ -34,31 +59,20 @@ def test_thirty_kills_at_random_moments_lose_nothing(tmp_path):
     rng, kills, runs = random.Random(1), 0, 0
     while kills < KILLS:
         runs += 1
-        directory = tmp_path / f"run {runs}"
-        killed, confirmed = True, {}
-        while killed:
-            child = os.fork()
-            if child == 0:  # a copy of this process, with its kernels loaded
-                try:
-                    begin(directory, LONG)
-                except BaseException:
-                    os._exit(1)
-                os._exit(0)
-            time.sleep(rng.uniform(0.01, 0.25))
-            if kills < KILLS:
-                os.kill(child, signal.SIGKILL)
-            _, status = os.waitpid(child, 0)
-            killed = os.WIFSIGNALED(status)
-            assert killed or os.WEXITSTATUS(status) == 0, "the resumed run failed"
-            kills += killed
+        directory, confirmed = tmp_path / f"run {runs}", {}
+
+        def look(directory=directory, confirmed=confirmed):
             manifest = Manifest(directory)
             manifest.read()
             confirmed |= {entry.name: entry.sha256 for entry in manifest.entries}
             for path in (directory / "snap").glob("*.vtkhdf"):
                 assert read_snapshot(path).step == int(path.stem)  # whole, confirmed or not
+
+        kills += killed_until_done(lambda directory=directory: begin(directory, LONG), KILLS - kills, rng, look)
         assert contents(directory) == expected
-        final = {entry.name: entry.sha256 for entry in manifest.entries}
-        assert confirmed.items() <= final.items()
+        manifest = Manifest(directory)
+        manifest.read()
+        assert confirmed.items() <= {entry.name: entry.sha256 for entry in manifest.entries}.items()
 
 
 class Disk:

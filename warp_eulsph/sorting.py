@@ -15,12 +15,15 @@ from .space import Space, difference
 
 log = logging.getLogger(__name__)
 
-# Steps between two looks at the order of a body whose reference moves.
+# Steps between two looks at the order, where the reference moves: a look that sorts costs half a step.
 STEPS_BETWEEN_SORTS = 200
 # Particles next to each other in memory have parted when they are so many spacings from each other.
 APART = 3.0
-# Largest share of parted ones that is left alone: lattices have one at the end of each row.
-MOST_PARTED = 0.5
+# Particles are sorted when a larger share of them than this have parted, and so many times the share that they have in
+# order, where the ends of rows part too: stirred liquids gain from there on (``python -m warp_eulsph.bench.mixing``).
+MOST_PARTED, MUCH_MORE = 0.1, 2.0
+# At the start any lattice is in order, be its rows as short as this share says.
+SHORT_ROWS = 0.25
 
 
 @functools.cache
@@ -31,19 +34,19 @@ def _make_count_parted(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def count_parted(
-        order: wp.array(dtype=wp.int32),
+        places: wp.array(dtype=wp.int32),
         particles: Particles,
         reference: Reference,
         box: vec,
-        parted: wp.array(dtype=wp.int32),
+        count: wp.array(dtype=wp.int32),
     ):
         i = wp.tid()
-        a = order[i]
-        b = order[i + 1]
+        a = places[i]
+        b = places[i + 1]
         spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
         far = wp.length(separation(reference.x[b], reference.x[a], box)) > real(APART) * spacing
         if far and particles.body[a] == particles.body[b]:
-            wp.atomic_add(parted, 0, 1)
+            wp.atomic_add(count, 0, 1)
 
     return count_parted
 
@@ -67,8 +70,11 @@ class Sorting:
         self.on = on and all(condition.sortable for condition in stepper.conditions)
         if on and not self.on:
             log.info("particles are not sorted in memory: a condition does not say that it is sortable")
-        self._parted = wp.zeros(1, dtype=wp.int32, device=self.device)
-        self.look()
+        self._count = wp.zeros(1, dtype=wp.int32, device=self.device)
+        self._in_order = SHORT_ROWS
+        if self.on:
+            self.look()
+            self._in_order = self.parted()
 
     def steps_left(self, step: int) -> int | None:
         """Steps from step number ``step`` to the next look; None if there is none."""
@@ -78,52 +84,43 @@ class Sorting:
 
     def look_after(self, step: int) -> None:
         """Look at the order if it is time to after ``step`` steps."""
-        if self.steps_left(step) == STEPS_BETWEEN_SORTS:
+        if self.steps_left(step) == STEPS_BETWEEN_SORTS:  # step is a multiple of it
             self.look()
 
     def look(self) -> None:
         """Sort the particles if it makes their order much better."""
-        if not self.on:
+        parted = self.parted()
+        if parted <= max(MOST_PARTED, MUCH_MORE * self._in_order):
             return
-        parted = self.parted(np.arange(self.stepper.n))
-        if parted <= MOST_PARTED:
+        places = self.sorted_places()
+        if parted <= MUCH_MORE * self.parted(places):
             return
-        sorted_places = self._sorted_places()
-        if self.parted(sorted_places) > 0.5 * parted:
-            return  # debris: nothing is near anything
         log.debug("particles sorted in memory after step %d: %.0f %% had parted", self.stepper.steps, 100.0 * parted)
-        self.permute(sorted_places)
+        self.permute(places)
 
-    def parted(self, places: np.ndarray) -> float:
-        """Share of the particles at these places, (n,), that are far from the one before them there; reads the
-        device."""
+    def parted(self, places: np.ndarray | None = None) -> float:
+        """Share of the particles that are far from the one before them, in memory or were they at these places, (n,),
+        instead; reads the device."""
         stepper, configuration = self.stepper, self.stepper.configuration
-        order = wp.array(places, dtype=wp.int32, device=self.device)
-        self._parted.zero_()
-        arguments = [order, stepper.particles, configuration.fields, configuration.lists.box, self._parted]
+        chosen = np.arange(stepper.n) if places is None else places
+        self._count.zero_()
+        arguments = [wp.array(chosen, dtype=wp.int32, device=self.device), stepper.particles, configuration.fields]
+        arguments += [configuration.lists.box, self._count]
         wp.launch(_make_count_parted(self.space), stepper.n - 1, arguments, device=self.device)
-        return int(self._parted.numpy()[0]) / stepper.n
+        return int(self._count.numpy()[0]) / stepper.n
 
     def permute(self, places: np.ndarray) -> None:
-        """Move the particles at these places, (n,), to the places 0, 1, …, each body within its range."""
+        """Move the particles at these places, (n,), to the places 0, 1, …, each body within its range.
+
+        Arrays change in place: recorded launches and graphs hold pointers.
+        """
         for array, body in self._arrays():
             chosen = wp.array(places[body.start : body.stop] - body.start, dtype=wp.int32, device=self.device)
             wp.copy(array, array[chosen].contiguous())
         self.order.rearrange(self.order.ids.numpy()[places])
         self.stepper.rebuild()
 
-    def _arrays(self) -> Iterator[tuple[wp.array, range]]:
-        """What evolves and has an element for each particle, and the particles that each array is of."""
-        stepper, n = self.stepper, self.stepper.n
-        conditions = [array for condition in stepper.conditions for array in condition.evolving().values()]
-        own = {id(array) for array in conditions}  # they go by number
-        bodies = dict(zip(map(id, stepper.flux.histories), stepper.flux.bodies, strict=True))
-        for array in stepper.evolving().values():
-            body = bodies.get(id(array), range(n))
-            if len(array) == len(body) and id(array) not in own:
-                yield array, body
-
-    def _sorted_places(self) -> np.ndarray:
+    def sorted_places(self) -> np.ndarray:
         """Places in the order that particles should have, each body within its range, (n,)."""
         stepper, configuration = self.stepper, self.stepper.configuration
         reference, particles = configuration.fields, stepper.particles
@@ -136,3 +133,14 @@ class Sorting:
             for body in stepper.flux.bodies
         ]
         return np.concatenate(sorted_bodies)
+
+    def _arrays(self) -> Iterator[tuple[wp.array, range]]:
+        """What evolves and has an element for each particle, and the particles that each array is of."""
+        stepper, n = self.stepper, self.stepper.n
+        conditions = [array for condition in stepper.conditions for array in condition.evolving().values()]
+        own = {id(array) for array in conditions}  # they go by number
+        bodies = dict(zip(map(id, stepper.flux.histories), stepper.flux.bodies, strict=True))
+        for array in stepper.evolving().values():
+            body = bodies.get(id(array), range(n))
+            if len(array) == len(body) and id(array) not in own:
+                yield array, body
