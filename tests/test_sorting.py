@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 from clouds import cloud
-from kept_runs import StopAfter
+from kept_runs import StopAfter, contents
 from test_crash import killed_until_done
 from test_materials import Remembering
 from test_resume import REFERENCES, SCHEMES, bits, reachable
@@ -38,6 +38,7 @@ def two_blocks(dim=2, *, order=None, conditions=None, material=RUBBER, **options
     """Jittered blocks side by side in irregular motion, the first held and driven; particles come in ``order``,
     (particles of a block,)."""
     x, volume = cloud(dim, SIDE[dim], jitter=0.1)
+    volume = volume * (1.0 + 0.1 * x[:, 0])
     velocity = 30.0 * np.sin(3.0 * x + np.roll(x, 1, axis=1))
     order = np.arange(len(x)) if order is None else order
     bodies = [
@@ -284,7 +285,7 @@ def test_bad_ids_are_refused(monkeypatch):
     assert np.array_equal(simulation.x, x) and np.array_equal(simulation.order.places, places)
 
 
-def kept(directory, until=5e-3, **options):
+def kept(directory, until=1e-2, **options):
     """Record blocks that are sorted on the way."""
     simulation = unsorted_blocks()
     probe = PointProbe(name="point", X=(0.5, 0.5))
@@ -293,8 +294,6 @@ def kept(directory, until=5e-3, **options):
 
 
 def test_stops_and_kills_between_sorts_leave_no_trace(tmp_path, monkeypatch):
-    from kept_runs import contents
-
     sorted_often(monkeypatch)
     whole = kept(tmp_path / "whole")
     assert whole.step > 30
@@ -303,8 +302,14 @@ def test_stops_and_kills_between_sorts_leave_no_trace(tmp_path, monkeypatch):
         outcome = kept(tmp_path / "stopped", stop=stop, watch=stop.watch, replace=True)
         assert outcome.stopped and kept(tmp_path / "stopped", resume=True).stopped is None
         assert contents(tmp_path / "stopped") == contents(tmp_path / "whole")
-    assert killed_until_done(lambda: kept(tmp_path / "killed", resume=True), kills=5) == 5
-    assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
+    kills = 0
+    for run in range(20):
+        directory = tmp_path / f"killed {run}"
+        kills += killed_until_done(lambda directory=directory: kept(directory, resume=True), 5 - kills)
+        assert contents(directory) == contents(tmp_path / "whole")
+        if kills == 5:
+            break
+    assert kills == 5
 
 
 @pytest.mark.parametrize("reference", REFERENCES[1:], ids=repr)
@@ -401,17 +406,19 @@ def distance_in_memory(x, spacing, order):
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])
-def test_spatial_order_is_that_of_a_lattice(dim):
+def test_spatial_order_brings_neighbours_together(dim):
     x, _ = cloud(dim, 9, jitter=0.2)
     mixed = np.random.default_rng(0).permutation(len(x))
     order = es.spatial_order(x[mixed], 1 / 9)
     assert np.array_equal(np.sort(order), np.arange(len(x)))
-    given = distance_in_memory(x, 1 / 9, np.arange(len(x)))
     assert distance_in_memory(x, 1 / 9, mixed) > 0.25
-    assert distance_in_memory(x, 1 / 9, mixed[order]) < 1.1 * given
-    lattice, _ = cloud(dim, 9, jitter=0.0)
-    mixed = np.random.default_rng(0).permutation(len(lattice))
-    assert np.array_equal(mixed[es.spatial_order(lattice[mixed], 1 / 9)], np.arange(len(lattice)))
+    assert distance_in_memory(x, 1 / 9, mixed[order]) < 1.1 * distance_in_memory(x, 1 / 9, np.arange(len(x)))
+
+
+def test_spatial_order_keeps_rows_of_a_lattice_together():
+    x, _ = cloud(3, 6, jitter=0.0)
+    rows = x[es.spatial_order(x, 1 / 6)].reshape(9, 24, 3)
+    np.testing.assert_allclose(np.ptp(rows, axis=1), np.tile([1 / 6, 1 / 6, 5 / 6], (9, 1)))
 
 
 def test_bad_input_is_named():
