@@ -121,6 +121,15 @@ def test_places_change_nothing_in_a_periodic_box():
     undisturbed_and_shuffled(lambda **options: es.Simulation(body, periodic=(1.0, 1.0), **options))
 
 
+def test_periodic_images_are_sorted_into_the_box():
+    x, volume = cloud(2, 8, jitter=0.1)
+    body = es.Body(x=x[np.random.default_rng(0).permutation(64)], volume=volume, material=RUBBER, surface=0.0)
+    simulation = es.Simulation(body, periodic=(1.0, 1.0), sort=False)
+    places, reference = simulation.sorting.sorted_places(), simulation.configuration.fields
+    reference.x.assign(reference.x.numpy() + np.random.default_rng(1).integers(-2, 3, (64, 2)))
+    assert np.array_equal(simulation.sorting.sorted_places(), places)
+
+
 def test_histories_of_materials_change_places():
     material = Remembering(density=1100.0, young=17e6, poisson=0.45)
     whole, mixed = undisturbed_and_shuffled(lambda **options: two_blocks(material=material, **options))

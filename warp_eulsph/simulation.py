@@ -47,7 +47,7 @@ class Simulation:
         dtype: ``wp.float64`` or ``wp.float32``.
         device: Warp device name; the default device if None.
         sort: keep particles sorted in memory, so that steps do not slow down as they move; False is for comparisons.
-            Results are in the order of the bodies' particles either way.
+            Results come in the order of the bodies' particles either way; for arrays on the device see ``order``.
 
     Raises:
         ValueError: bodies of different dimension, equal names, coincident particles, particles whose neighbours do not

@@ -66,5 +66,5 @@ class BoundBodyForce(Bound):
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x if self.X is None else self.X, clock, fraction)
-        arguments = [self.values.indices, values, self.mass, external]
+        arguments = [self.values.places, values, self.mass, external]
         wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)

@@ -78,5 +78,5 @@ class BoundMotion(Bound):
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         before = self.before.at(self.X, clock, fraction - 0.5)
         after = self.after.at(self.X, clock, fraction + 0.5)
-        arguments = [self.before.indices, before, after, clock, state.v]
+        arguments = [self.before.places, before, after, clock, state.v]
         wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)

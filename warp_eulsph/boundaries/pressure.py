@@ -62,5 +62,5 @@ class BoundPressure(Bound):
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
-        arguments = [self.values.indices, values, state, external]
+        arguments = [self.values.places, values, state, external]
         wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)

@@ -35,7 +35,7 @@ class Value:
     """Rows of ``components`` reals for k particles, kept on the device.
 
     Attributes:
-        indices: places of the particles, (k,) int32 on the device.
+        places: of the particles in memory, (k,) int32 on the device.
 
     Args:
         assembly: the particles.
@@ -50,7 +50,7 @@ class Value:
     def __init__(self, assembly: Assembly, indices: np.ndarray, components: int, given: Any, who: str):
         self.space, self.device, self.components, self.who = assembly.space, assembly.device, components, who
         self.count = len(indices)
-        self.indices = assembly.order.places_of(indices)
+        self.places = assembly.order.places_of(indices)
         self.rows = wp.zeros(len(indices), dtype=self.space.row(components), device=assembly.device)
         self.function = given if callable(given) else None
         self.on_device = isinstance(given, wp.Function)
@@ -68,10 +68,10 @@ class Value:
         """The rows at positions ``x`` [m] and time t + fraction · Δt, (k,)."""
         if self.on_device:
             kernel = _make_evaluate(self.space, self.components, self.function)
-            wp.launch(kernel, len(self.indices), [self.indices, x, clock, fraction, self.rows], device=self.device)
+            wp.launch(kernel, len(self.places), [self.places, x, clock, fraction, self.rows], device=self.device)
         elif self.function is not None:
             t = float(clock.t.numpy()[0]) + fraction * float(clock.dt.numpy()[0])
-            self.rows.assign(self._broadcast(self.function(x.numpy()[self.indices.numpy()], t)))
+            self.rows.assign(self._broadcast(self.function(x.numpy()[self.places.numpy()], t)))
         return self.rows
 
     def _broadcast(self, given: Any) -> np.ndarray:

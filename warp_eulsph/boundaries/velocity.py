@@ -65,7 +65,7 @@ class BoundVelocity(Bound):
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         values = self.values.at(state.x, clock, fraction)
-        arguments = [self.values.indices, values, self.axes, state.v]
+        arguments = [self.values.places, values, self.axes, state.v]
         wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)
 
 
