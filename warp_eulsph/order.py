@@ -79,7 +79,9 @@ class Order:
         if not np.array_equal(np.sort(ids), np.arange(n)):
             raise ValueError(f"ids must hold each number from 0 to {n - 1} once, got {ids}")
         self.ids.assign(ids)
-        self.places[ids] = np.arange(n, dtype=np.int32)
+        places = np.empty(n, dtype=np.int32)
+        places[ids] = np.arange(n, dtype=np.int32)
+        self.places = places  # who took the last one has those of that moment
         self._kept = [(reference, values) for reference, values in self._kept if reference() is not None]
         for reference, values in self._kept:
             array = reference()
