@@ -20,7 +20,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("dim", "dtype", "arch"), CASES)
-def test_kernels_of_an_eulerian_step_compile_and_do_not_spill(dim, dtype, arch, monkeypatch, tmp_path):
+def test_kernels_of_a_step_compile_and_do_not_spill(dim, dtype, arch, monkeypatch, tmp_path):
     launched = {}
     launch = wp.launch
 
@@ -34,8 +34,12 @@ def test_kernels_of_an_eulerian_step_compile_and_do_not_spill(dim, dtype, arch, 
     x = np.stack(np.meshgrid(*[s] * dim, indexing="ij"), -1).reshape(-1, dim)
     material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
     body, fixed = es.Body(x=x, volume=5.0**-dim, material=material), es.Fixed(lambda X: X[:, 0] < 0.2)
-    for scheme in (es.Verlet(), es.LaxWendroff(smoothing=es.LinearExact())):
-        simulation = es.Simulation(body, boundaries=[fixed], scheme=scheme, dtype=dtype)
+    for scheme, reference in (
+        (es.Verlet(), es.Always()),
+        (es.Verlet(), es.Never()),
+        (es.LaxWendroff(smoothing=es.LinearExact()), es.Always()),
+    ):
+        simulation = es.Simulation(body, boundaries=[fixed], reference=reference, scheme=scheme, dtype=dtype)
         simulation.step(2)
         simulation.energy()
         simulation.momentum()

@@ -33,11 +33,20 @@ def test_estimate_is_near_what_is_allocated(dim, dtype, reference, simd, monkeyp
     assert 0.8 * taken < expected < 1.2 * taken
 
 
+def test_a_fixed_reference_keeps_no_search_and_finds_its_neighbours_again():
+    simulation = es.Simulation(block(2), reference=es.Never())
+    lists = simulation.configuration.lists
+    before = lists.rows.index.numpy().copy(), simulation.configuration.fields.L.numpy().copy()
+    searching = memory.array_bytes(lists) - 4 * (len(lists.rows.index) + len(lists.rows.start)) - 8 * len(lists.rows.w)
+    assert searching < 16 * len(simulation.x)  # h and bodies, which are the particles'
+    simulation.stepper.rebuild()  # as after a restore
+    assert np.array_equal(lists.rows.index.numpy(), before[0])
+    assert np.array_equal(simulation.configuration.fields.L.numpy(), before[1])
+
+
 def test_a_run_that_does_not_fit_is_refused_with_the_number(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda device: 1_000_000)
-    with pytest.raises(
-        MemoryError, match=r"8000 particles take about 2\d\d\d bytes each, 0.02\d* GB, and 0.001 GB are"
-    ):
+    with pytest.raises(MemoryError, match=r"8000 particles take about 2\d\d\d bytes each, 0.0\d* GB, and 0.001 GB are"):
         es.Simulation(block(3))
 
 

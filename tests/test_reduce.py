@@ -1,11 +1,13 @@
 """Sums over particles: of any number, the same bits on any number of threads."""
 
+import functools
+
 import numpy as np
 import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.reduce import LEAST, MOST_BLOCKS, Sum
+from warp_eulsph.reduce import LEAST, MOST_BLOCKS, Sum, SumOfParticles
 
 
 @pytest.mark.parametrize("n", [0, 1, LEAST, LEAST + 1, LEAST**2 + 5, 3 * LEAST * MOST_BLOCKS + 7])
@@ -20,3 +22,38 @@ def test_sums_are_right_and_repeatable(n):
     execution.set_threads(threads)
     assert np.array_equal(*found)
     np.testing.assert_allclose(found[0], values.sum(axis=0), rtol=0.0, atol=1e-15 * max(np.abs(values).sum(), 1.0))
+
+
+@functools.cache
+def _make_squares():
+    @wp.kernel(module="unique", enable_backward=False)
+    def squares(
+        first: int,
+        n: int,
+        each: int,
+        x: wp.array(dtype=wp.float64),
+        seen: wp.array(dtype=int),
+        out: wp.array(dtype=wp.float64),
+    ):
+        block = first + wp.tid()
+        total = wp.float64(0.0)
+        for a in range(block * each, wp.min((block + 1) * each, n)):
+            total += x[a] * x[a]
+            seen[a] = seen[a] + 1
+        out[block] = total
+
+    return squares
+
+
+@pytest.mark.parametrize("n", [1, LEAST, LEAST + 1, 40 * LEAST + 13])
+def test_every_particle_is_in_one_block(n, monkeypatch):
+    monkeypatch.setattr(execution, "LEAST_RANGE", 16)
+    x, seen = wp.array(np.arange(n) + 1.0, dtype=wp.float64, device="cpu"), wp.zeros(n, dtype=int, device="cpu")
+    total, out = SumOfParticles(wp.float64, n, "cpu"), wp.zeros(1, dtype=wp.float64, device="cpu")
+    threads = execution.threads()
+    for count in (1, 3):
+        execution.set_threads(count)
+        total(_make_squares(), [x, seen], out)
+        assert out.numpy()[0] == n * (n + 1) * (2 * n + 1) // 6  # whole numbers: exact in any order
+    execution.set_threads(threads)
+    assert (seen.numpy() == 2).all()

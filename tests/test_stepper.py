@@ -68,6 +68,8 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
         stabiliser = es.PairAreas(kappa=kappa).build(
             stepper.space, stepper.particles, stepper.flux, stepper.policy, stepper.device
         )
+        assert stabiliser.takes_dual(stepper.configuration, sensed=False)
+        stepper.flux.keep_dual()
         stabiliser.refresh(stepper.configuration, stepper.U)
         stepper._velocity_gradient(stepper.U)
         stepper._stress(stepper.U)

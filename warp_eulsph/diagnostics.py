@@ -8,7 +8,7 @@ import warp as wp
 
 from .fields import structure
 from .linalg import det
-from .reduce import Sum
+from .reduce import Sum, SumOfParticles
 from .space import Space
 
 _Vec6 = wp.types.vector(length=6, dtype=wp.float64)
@@ -17,19 +17,22 @@ _Vec11 = wp.types.vector(length=11, dtype=wp.float64)
 
 @functools.cache
 def _make_momenta(space: Space) -> Any:
-    """Kernel: (m v, m x × v) of each particle, padded to 3-D."""
+    """Kernel of ``SumOfParticles``: (m v, m x × v), padded to 3-D."""
     Particles, State, dim = structure(space, "Particles"), structure(space, "State"), space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
-    def momenta(particles: Particles, state: State, out: wp.array(dtype=_Vec6)):
-        a = wp.tid()
-        x = wp.vec3d()
-        p = wp.vec3d()
-        for i in range(wp.static(dim)):
-            x[i] = wp.float64(state.x[a][i])
-            p[i] = wp.float64(particles.share[a] * particles.mass[a]) * wp.float64(state.v[a][i])
-        L = wp.cross(x, p)
-        out[a] = _Vec6(p[0], p[1], p[2], L[0], L[1], L[2])
+    def momenta(first: int, n: int, each: int, particles: Particles, state: State, out: wp.array(dtype=_Vec6)):
+        block = first + wp.tid()
+        total = _Vec6()
+        for a in range(block * each, wp.min((block + 1) * each, n)):
+            x = wp.vec3d()
+            p = wp.vec3d()
+            for i in range(wp.static(dim)):
+                x[i] = wp.float64(state.x[a][i])
+                p[i] = wp.float64(particles.share[a] * particles.mass[a]) * wp.float64(state.v[a][i])
+            L = wp.cross(x, p)
+            total += _Vec6(p[0], p[1], p[2], L[0], L[1], L[2])
+        out[block] = total
 
     return momenta
 
@@ -151,33 +154,33 @@ class SectionForce:
 
 
 class Diagnostics:
-    """Sums over all particles of a state, without allocation after construction."""
+    """Sums and extrema over all particles of a state, and its volume ratios."""
 
     def __init__(self, space: Space, particles: Any, device: Any):
-        n = len(particles.mass)
         self.space, self.particles, self.device = space, particles, device
-        self._each = wp.zeros(n, dtype=_Vec6, device=device)
         self._total = wp.zeros(1, dtype=_Vec6, device=device)
-        self._jacobian = wp.zeros(n, dtype=space.real, device=device)
         self._extrema = wp.zeros(3, dtype=space.real, device=device)
-        self._sum = Sum(_Vec6, n, device)
+        self._sum = SumOfParticles(_Vec6, len(particles.mass), device)
 
     def momenta(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
         """Linear [kg m/s] and angular momentum about the origin [kg m²/s], both padded to (3,)."""
-        arguments = [self.particles, state, self._each]
-        wp.launch(_make_momenta(self.space), len(self._each), arguments, device=self.device)
-        self._sum(self._each, self._total)
+        self._sum(_make_momenta(self.space), [self.particles, state], self._total)
         total = self._total.numpy()[0].copy()
         return total[:3], total[3:]
 
     def extrema(self, state: Any) -> tuple[float, float, float]:
         """Least and largest det F [-], and largest speed [m/s]."""
         self._extrema.assign([np.inf, -np.inf, 0.0])
-        wp.launch(_make_extrema(self.space), len(self._each), [state, self._extrema], device=self.device)
+        wp.launch(_make_extrema(self.space), len(state.x), [state, self._extrema], device=self.device)
         least, largest, speed = self._extrema.numpy().tolist()
         return least, largest, speed
 
     def jacobians(self, state: Any) -> np.ndarray:
         """det F of each particle, (n,)."""
-        wp.launch(_make_jacobian(self.space), len(self._each), [state.F, self._jacobian], device=self.device)
-        return self._jacobian.numpy().copy()
+        return self.volume_ratios(state).numpy()
+
+    def volume_ratios(self, state: Any) -> wp.array:
+        """det F of each particle, (n,), on the device."""
+        found = wp.empty(len(state.F), dtype=self.space.real, device=self.device)
+        wp.launch(_make_jacobian(self.space), len(found), [state.F, found], device=self.device)
+        return found

@@ -101,14 +101,16 @@ class Launcher:
         self.device = wp.get_device(device)
         self._recorded: dict[tuple[Any, ...], tuple[list[Any], Any]] = {}
 
-    def __call__(self, kernel: Any, n: int, arguments: Sequence[Any], first: int = 0) -> None:
+    def __call__(self, kernel: Any, n: int, arguments: Sequence[Any], first: int = 0, each: int = 1) -> None:
         """Launch over particles ``first`` … ``first + n − 1``, in ranges on several threads on the CPU.
+
+        Or over blocks of ``each`` particles, numbered so.
 
         The kernel's first parameter, which is not among ``arguments``, is the index that its thread 0 has. It must
         write to its own particle only.
         """
         whole = not self.device.is_cpu or self.device.is_capturing  # a graph on the CPU runs on one thread
-        ranges = ((0, n),) if whole else _ranges(n)
+        ranges = ((0, n),) if whole else _ranges(n, each)
         commands = self._commands(kernel, ranges, arguments, first)
         if len(ranges) == 1:
             commands[0].launch()
@@ -150,9 +152,9 @@ def _take(commands: Iterator[Any]) -> None:
         command.launch()
 
 
-def _ranges(n: int) -> tuple[tuple[int, int], ...]:
-    """[begin, end) of the ranges that n particles are split into."""
-    count = 1 if _threads == 1 else min(_threads * RANGES_PER_THREAD, n // LEAST_RANGE)
+def _ranges(n: int, each: int = 1) -> tuple[tuple[int, int], ...]:
+    """[begin, end) of the ranges that n blocks of ``each`` particles are split into."""
+    count = 1 if _threads == 1 else min(_threads * RANGES_PER_THREAD, n * each // LEAST_RANGE, n)
     if count <= 1:
         return ((0, n),)
     ends = [n * k // count for k in range(count + 1)]

@@ -6,6 +6,7 @@ struct of a group and ``allocate`` its arrays, so that the table cannot drift fr
 """
 
 import functools
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import warp as wp
@@ -33,21 +34,26 @@ STATE = {
     "x": Field("vec", "m", "position"),
     "v": Field("vec", "m/s", "velocity"),
     "F": Field("mat", "-", "deformation gradient from the initial configuration, as the material carries it"),
-    "surface": Field("vec", "m^(d-1)", "outward area vector s_a, zero inside the body, moved by Nanson's rule (M10)"),
+    "surface": Field(
+        "vec", "m^(d-1)", "outward area vector s_a, zero inside the body, moved by Nanson's rule (M10) where it is read"
+    ),
 }
 REFERENCE = {
     "x": Field("vec", "m", "position in the reference"),
     "balanced": Field("vec", "m", "position that M4 and M5 take pair vectors from; x unless balanced (M13)"),
     "h": Field("real", "m", "smoothing length in the reference, which follows J_k^(1/d)"),
     "V": Field("real", "m^d", "volume in the reference, det(F_k) V0"),
+    "resolution": Field(
+        "real", "1/m", "of a fixed reference, 1/spacing, more where L is large: for the Courant number"
+    ),
     "L": Field("mat", "-", "gradient correction (M3), not symmetric where positions are balanced (M13)"),
-    "F": Field("mat", "-", "deformation gradient of the reference, F_k"),
+    "F": Field("mat", "-", "deformation gradient of the reference, F_k; empty where it is fixed, F_k = I"),
     "row": Field("real", "kg/m^(d+2)", "sum of m_b g_ab over the neighbours (M7)"),
     "diagonal": Field("real", "1/m^2", "sum of V_b g_ab over the neighbours, of the graph Laplacian (M13)"),
 }
 FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
-    "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5)"),
+    "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
     "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
     "impedance": Field("real", "kg/(m^2 s)", "density times pressure-wave speed, both measured in the reference (M9)"),
     "shear_impedance": Field(
@@ -77,12 +83,17 @@ def structure(space: Space, group: str) -> Any:
     return wp.struct(type(group, (), {"__annotations__": annotations, "__module__": __name__}))
 
 
-def allocate(space: Space, group: str, n: int, device: Any) -> Any:
-    """An instance of a group's struct with zeroed arrays of ``n`` particles."""
+def allocate(space: Space, group: str, n: int, device: Any, empty: Collection[str] = ()) -> Any:
+    """An instance of a group's struct with zeroed arrays of ``n`` particles, of none where the name is in ``empty``."""
     fields = structure(space, group)()
     for name, field in GROUPS[group].items():
-        setattr(fields, name, wp.zeros(n, dtype=element(space, field.kind), device=device))
+        setattr(fields, name, wp.zeros(0 if name in empty else n, dtype=element(space, field.kind), device=device))
     return fields
+
+
+def repeated(one: wp.array, n: int) -> wp.array:
+    """An array of ``n`` elements, to be read only, that all are the one of ``one``, whose memory they take."""
+    return wp.array(ptr=one.ptr, shape=(n,), strides=(0,), dtype=one.dtype, device=one.device)
 
 
 def arrays(fields: Any, group: str) -> dict[str, wp.array]:

@@ -21,17 +21,25 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) ->
     Args:
         space: dimension and precision.
         reach: support radius in spacings, which says how many neighbours there are.
-        moving: whether the reference moves: lists with room to grow, balanced positions.
+        moving: whether the reference moves: lists with room to grow, what a search needs, balanced positions.
         device: SIMD kernels of the CPU keep packed rows.
     """
-    d = space.dim
+    d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
-    reals = sum(sizes[field.kind] for group in GROUPS.values() for field in group.values())
-    reals += sum(sizes[field.kind] for field in GROUPS["State"].values())  # the half step
-    reals += 2 * d * d + 3 + d + (3 * d if moving else 0)  # ∇v, K; places, old v; M13
-    ints, doubles = 5, 16  # body, number, lists; books, momenta
-    if simd(device):
-        reals += LANES * (2 + 2 * d) + 5
+    absent = {"Forces.correction", "Forces.external"} | ({"Flux.Pi"} if vectors else set())
+    absent |= {"Reference.resolution"} if moving else {"Reference.F", "Reference.balanced"}
+    present = [
+        field for group, fields in GROUPS.items() for name, field in fields.items() if f"{group}.{name}" not in absent
+    ]
+    reals = sum(sizes[field.kind] for field in present) + 2 * d + d * d + d * d + d  # the half step, ∇v, old v
+    ints, doubles = 4, 2 + 2 * 7 / 64  # body, number, start, poor; energies, blocks of the books
+    if vectors:
+        reals += LANES * (2 + 2 * d)
+    if moving:
+        reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
+        ints += 1
+    if moving and vectors:
+        reals += 5
         ints += 6
     item = wp.types.type_size_in_bytes(space.real)
     neighbours = math.pi ** (d / 2) / math.gamma(d / 2 + 1) * reach**d

@@ -1,6 +1,7 @@
 """Sums over particles on the device in a fixed order: the same bits every run."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import warp as wp
@@ -51,3 +52,23 @@ class Sum:
             self._launch(_make_partial(self.dtype), blocks, [values, n, blocks, into])
             values, n, into, then = into, blocks, then, into
         self._launch(_make_partial(self.dtype), 1, [values, n, 1, out])
+
+
+class SumOfParticles:
+    """Σ over ``n`` particles of what a kernel makes of each, without an array of all that on the CPU.
+
+    The kernel's parameters are the number of the block that its thread 0 has, n, the size of a block, its own ones, and
+    an array, whose element k takes the sum over block k. Blocks are single particles on GPUs, whose threads must read
+    side by side.
+    """
+
+    def __init__(self, dtype: Any, n: int, device: Any):
+        self.n, self.each, self._launch = n, LEAST if wp.get_device(device).is_cpu else 1, Launcher(device)
+        self._blocks = wp.zeros(-(-n // self.each), dtype=dtype, device=device)
+        self._sum = Sum(dtype, len(self._blocks), device)
+
+    def __call__(self, kernel: Any, arguments: Sequence[Any], out: wp.array) -> None:
+        """``out[0]`` ← Σ of what ``kernel`` makes of its ``arguments``."""
+        arguments = [self.n, self.each, *arguments, self._blocks]
+        self._launch(kernel, len(self._blocks), arguments, each=self.each)
+        self._sum(self._blocks, out)

@@ -18,7 +18,7 @@ from .scheme.flux import Flux, check_reference
 from .scheme.graphs import StepGraphs, recordable
 from .scheme.health import UnstableError, last_good
 from .scheme.lax import Lax
-from .scheme.lax_wendroff import LaxWendroff
+from .scheme.lax_wendroff import LaxWendroff, is_corrected
 from .scheme.reference import Always, Configuration, ReferencePolicy
 from .scheme.time_step import DeviceClock, TimeStep
 from .scheme.verlet import Verlet
@@ -90,7 +90,11 @@ class Simulation:
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
         materials = [(body.material, len(body.x)) for body in self.bodies]
         flux = Flux(self.space, materials, self.particles, self.device)
-        configuration = Configuration(self.space, weight, self.particles, box, self.device)
+        surface_given = self.bodies[0].surface is not None
+        corrected = is_corrected(scheme, reference, surface_given)
+        configuration = Configuration(
+            self.space, weight, self.particles, box, self.device, fixed=reference.fixed, corrected=corrected
+        )
         self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
         U = self._state(X)
         self.stepper = scheme.build(
@@ -102,7 +106,7 @@ class Simulation:
             reference,
             self.clock,
             self.conditions,
-            self.bodies[0].surface is not None,
+            surface_given,
         )
         self._check_neighbourhoods(X)
         self.sorting = Sorting(self.stepper, self.order, sort)

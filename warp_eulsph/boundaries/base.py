@@ -104,6 +104,16 @@ class Bound:
     recordable: bool = False
     sortable: bool = False
 
+    @property
+    def loads(self) -> bool:
+        """Whether ``load`` adds forces."""
+        return type(self).load is not Bound.load
+
+    @property
+    def reads_surface(self) -> bool:
+        """Whether ``load`` reads ``state.surface``; where the reference is fixed they move for those that do."""
+        return self.loads
+
     def start(self, state: Any) -> None:
         """Prepare from the initial state, surface vectors included; called once."""
 

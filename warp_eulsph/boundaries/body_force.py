@@ -52,6 +52,7 @@ def _make_load(space: Space) -> Any:
 class BoundBodyForce(Bound):
     """Adds the weight of the particles."""
 
+    reads_surface = False
     sortable = True
 
     def __init__(self, condition: BodyForce, assembly: Assembly):

@@ -65,6 +65,7 @@ class BoundTraction(Bound):
         areas: initial areas (s_0·n) [m^(dim−1)] of the particles, (k,); their sum is the area of the face.
     """
 
+    reads_surface = False
     sortable = True
 
     def __init__(self, condition: Traction, assembly: Assembly):

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import warp as wp
 
+from ..linalg import reciprocal_cube_root
 from ..space import Space
 
 
@@ -48,6 +49,18 @@ def largest_eigenvalue(real: type) -> Any:
         return real(0.5) * (A + C) + wp.sqrt(half * half + B * B)
 
     return largest_eigenvalue
+
+
+@functools.cache
+def isochoric(real: type) -> Any:
+    """``wp.func`` J^(−2/3), NaN unless J > 0."""
+    root = reciprocal_cube_root(real)
+
+    @wp.func
+    def isochoric(J: real) -> real:
+        return root(J) * root(J)
+
+    return isochoric
 
 
 @dataclass(frozen=True, kw_only=True)

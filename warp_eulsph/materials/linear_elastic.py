@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import warp as wp
 
-from ..linalg import symmetric_bounds
+from ..linalg import stretch_bounds
 from ..space import Space
 from .base import Isotropic, Law
 
@@ -30,7 +30,7 @@ class LinearElastic(Isotropic):
 @functools.cache
 def _law(space: Space) -> Law:
     dim, real, mat, pair = space.dim, space.real, space.mat, space.row(2)
-    eigen_bounds = symmetric_bounds(space)
+    bounds = stretch_bounds(space)
 
     @wp.struct
     class Constants:
@@ -54,7 +54,7 @@ def _law(space: Space) -> Law:
     @wp.func
     def wave_moduli(F: mat, c: Constants) -> pair:
         # Q(n) = μ |w|² I + (λ + μ) w⊗w, w = Fᵀn
-        b_max = eigen_bounds(F @ wp.transpose(F))[1]
+        b_max = bounds(F)[1]
         return pair((c.lam + real(2.0) * c.mu) * b_max, c.mu * b_max)
 
     return Law(Constants, stress, energy, wave_moduli)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from ..linalg import cofactor, det, symmetric_bounds
+from ..linalg import cofactor, det, stretch_bounds
 from ..space import Space
-from .base import Law, Material, largest_eigenvalue, positive
+from .base import Law, Material, isochoric, largest_eigenvalue, positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,8 +43,8 @@ class MooneyRivlin(Material):
 @functools.cache
 def _law(space: Space) -> Law:
     real, mat, vec2 = space.real, space.mat, space.row(2)
-    determinant, cof, eigen_bounds = det(space), cofactor(space), symmetric_bounds(space)
-    coupled = largest_eigenvalue(real)
+    determinant, cof, bounds = det(space), cofactor(space), stretch_bounds(space)
+    coupled, shape_factor = largest_eigenvalue(real), isochoric(real)
     missing = float(3 - space.dim)  # stretches that are held at one
 
     @wp.struct
@@ -63,8 +63,8 @@ def _law(space: Space) -> Law:
         J = determinant(F)
         b = F @ wp.transpose(F)
         I = invariants(b)  # noqa: E741 (the invariants I1, I2)
-        a1 = c.c10 * wp.pow(J, real(-2.0) / real(3.0))
-        a2 = c.c01 * wp.pow(J, real(-4.0) / real(3.0))
+        factor = shape_factor(J)
+        a1, a2 = c.c10 * factor, c.c01 * factor * factor
         shape = F * (real(2.0) * (a1 + a2 * I[0])) - (b @ F) * (real(2.0) * a2)
         mean = (a1 * I[0] + real(2.0) * a2 * I[1]) * (real(2.0) / real(3.0)) / J
         return shape + cof(F) * (c.kappa * (J - real(1.0)) - mean)
@@ -73,8 +73,8 @@ def _law(space: Space) -> Law:
     def energy(F: mat, c: Constants) -> real:
         J = determinant(F)
         I = invariants(F @ wp.transpose(F))  # noqa: E741
-        shape = c.c10 * (wp.pow(J, real(-2.0) / real(3.0)) * I[0] - real(3.0))
-        shape += c.c01 * (wp.pow(J, real(-4.0) / real(3.0)) * I[1] - real(3.0))
+        factor = shape_factor(J)
+        shape = c.c10 * (factor * I[0] - real(3.0)) + c.c01 * (factor * factor * I[1] - real(3.0))
         return shape + real(0.5) * c.kappa * (J - real(1.0)) * (J - real(1.0))
 
     @wp.func
@@ -82,12 +82,10 @@ def _law(space: Space) -> Law:
         # With s = m·n and B = cof F cof Fᵀ: m·Q m = c10 J^(−2/3) [10/9 s² I1 − 8/3 s m·b n + 2 n·b n]
         # + c01 J^(−4/3) [−2/9 s² I2 + 4/3 s m·B n + 2 m·B m] + κ J² s²; entries bounded as in NeoHookean.
         J = determinant(F)
-        b = F @ wp.transpose(F)
-        I = invariants(b)  # noqa: E741
-        q = eigen_bounds(b)
-        p = eigen_bounds(cof(F) @ wp.transpose(cof(F)))
-        a1 = c.c10 * wp.pow(J, real(-2.0) / real(3.0))
-        a2 = c.c01 * wp.pow(J, real(-4.0) / real(3.0))
+        I = invariants(F @ wp.transpose(F))  # noqa: E741
+        q, p = bounds(F), bounds(cof(F))
+        factor = shape_factor(J)
+        a1, a2 = c.c10 * factor, c.c01 * factor * factor
         along = a1 * (real(10.0) * I[0] - real(6.0) * q[0]) + a2 * (real(30.0) * p[1] - real(2.0) * I[1])
         along = along / real(9.0) + c.kappa * J * J
         across = real(2.0) * (a1 * q[1] + a2 * p[1])

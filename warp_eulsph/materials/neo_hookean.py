@@ -6,9 +6,9 @@ from typing import Any
 
 import warp as wp
 
-from ..linalg import cofactor, det, symmetric_bounds
+from ..linalg import cofactor, det, stretch_bounds
 from ..space import Space
-from .base import Isotropic, Law, lame_constants, largest_eigenvalue
+from .base import Isotropic, Law, isochoric, lame_constants, largest_eigenvalue
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +58,8 @@ def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: 
         volumetric_modulus: ``wp.func`` J -> J² U''.
     """
     real, mat, pair = space.real, space.mat, space.row(2)
-    determinant, cof, eigen_bounds = det(space), cofactor(space), symmetric_bounds(space)
-    coupled = largest_eigenvalue(real)
+    determinant, cof, bounds = det(space), cofactor(space), stretch_bounds(space)
+    coupled, shape_factor = largest_eigenvalue(real), isochoric(real)
     missing = float(3 - space.dim)  # stretches that are held at one
 
     @wp.struct
@@ -70,15 +70,15 @@ def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: 
     @wp.func
     def stress(F: mat, c: Constants) -> mat:
         J = determinant(F)
-        isochoric = wp.pow(J, real(-2.0) / real(3.0))
+        mu = c.mu * shape_factor(J)
         F_F = wp.ddot(F, F) + real(missing)
-        return F * (c.mu * isochoric) + cof(F) * (c.kappa * pressure_slope(J) - c.mu / real(3.0) * isochoric / J * F_F)
+        return F * mu + cof(F) * (c.kappa * pressure_slope(J) - mu / (real(3.0) * J) * F_F)
 
     @wp.func
     def energy(F: mat, c: Constants) -> real:
         J = determinant(F)
         F_F = wp.ddot(F, F) + real(missing)
-        shape = real(0.5) * c.mu * (wp.pow(J, real(-2.0) / real(3.0)) * F_F - real(3.0))
+        shape = real(0.5) * c.mu * (shape_factor(J) * F_F - real(3.0))
         return shape + c.kappa * volumetric_energy(J)
 
     @wp.func
@@ -86,14 +86,13 @@ def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: 
         # m·Q m = μ J^(−2/3) [5/9 s² tr b − 4/3 s m·b n + n·b n] + κ J² U'' s², s = m·n; in the plane of n and a
         # perpendicular p a 2×2 matrix whose entries are bounded one by one, |p·b n| ≤ (b_max − b_min)/2.
         J = determinant(F)
-        isochoric = wp.pow(J, real(-2.0) / real(3.0))
-        b = F @ wp.transpose(F)
-        trace = wp.trace(b) + real(missing)
-        b_range = eigen_bounds(b)
-        mu = c.mu * isochoric
-        along = mu * (real(5.0) / real(9.0) * trace - b_range[0] / real(3.0)) + c.kappa * volumetric_modulus(J)
+        mu = c.mu * shape_factor(J)
+        trace = wp.ddot(F, F) + real(missing)
+        b_range = bounds(F)
+        third = real(1.0) / real(3.0)
+        along = mu * (real(5.0) * third * third * trace - third * b_range[0]) + c.kappa * volumetric_modulus(J)
         across = mu * b_range[1]
-        mixed = mu / real(3.0) * (b_range[1] - b_range[0])
+        mixed = mu * third * (b_range[1] - b_range[0])
         return pair(coupled(along, mixed, across), across)
 
     return Law(Constants, stress, energy, wave_moduli)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from ..linalg import symmetric_bounds
+from ..linalg import stretch_bounds
 from ..space import Space
 from .base import Isotropic, Law
 
@@ -27,7 +27,7 @@ class SaintVenantKirchhoff(Isotropic):
 @functools.cache
 def _law(space: Space) -> Law:
     dim, real, mat, pair = space.dim, space.real, space.mat, space.row(2)
-    eigen_bounds = symmetric_bounds(space)
+    bounds = stretch_bounds(space)
 
     @wp.struct
     class Constants:
@@ -53,7 +53,7 @@ def _law(space: Space) -> Law:
         # m·Q m = n·τ n + (λ + μ)(m·b n)² + μ (m·b m)(n·b n), τ = λ tr(E) b + μ (b² − b), whose largest value is at one
         # end of the range of b because τ is convex in it. Along the principal directions i, k of b the shear modulus is
         # (τ_i − τ_k)/(b_i − b_k) b_i = [λ tr(E) + μ (b_i + b_k − 1)] b_i.
-        b = eigen_bounds(F @ wp.transpose(F))
+        b = bounds(F)
         pre = c.lam * wp.trace(strain(F)) - c.mu
         tension = wp.max((pre + c.mu * b[0]) * b[0], (pre + c.mu * b[1]) * b[1])
         shear = wp.max(pre + real(2.0) * c.mu * b[1], real(0.0))

@@ -168,7 +168,7 @@ def corrected_inverse(space: Space) -> Any:
 
 @functools.cache
 def make_correct(space: Space) -> Any:
-    """Kernel: L_a from K_a (M3), and ``poor``: directions in which a particle fell back."""
+    """Kernel: L_a from K_a (M3), which may be the same array; ``poor``: directions in which a particle fell back."""
     real, mat, dim = space.real, space.mat, space.dim
     Reference = structure(space, "Reference")
     invert, bounds, eigen = corrected_inverse(space), symmetric_bounds(space), symmetric_eigen(space)
@@ -176,10 +176,11 @@ def make_correct(space: Space) -> Any:
     @wp.kernel(module="unique", enable_backward=False)
     def correct(first: int, K: wp.array(dtype=mat), reference: Reference, poor: wp.array(dtype=wp.int32)):
         a = first + wp.tid()
-        reference.L[a] = invert(K[a])
+        K_a = mat(K[a])
+        reference.L[a] = invert(K_a)
         lacking = int(0)
-        if bounds(K[a])[0] < real(CUTOFF):
-            _, values = eigen(K[a])
+        if bounds(K_a)[0] < real(CUTOFF):
+            _, values = eigen(K_a)
             for i in range(wp.static(dim)):
                 if values[i] < real(CUTOFF):
                     lacking += 1

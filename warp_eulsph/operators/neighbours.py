@@ -10,7 +10,7 @@ import warp as wp
 from ..atomics import raise_to
 from ..execution import Launcher, simd
 from ..fields import neighbour_structure
-from ..space import Space, difference
+from ..space import Space, difference, vector_type
 from ..weights import Weight
 from .cells import Cells
 
@@ -165,15 +165,10 @@ class NeighbourLists:
         self.space, self.device, self._launch = space, device, Launcher(device)
         self.h, self.body, self.box = h, body, space.vec(*box)
         n = len(h)
-        self.support = weight.support
-        self.cells = Cells(space, self.support, h, body, self.box, device) if simd(device) else None
-        if self.cells is None:
-            side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
-            self.grid = wp.HashGrid(
-                side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
-            )
-        self.padded = wp.zeros(n, dtype=wp.types.vector(length=3, dtype=space.real), device=device)
-        self.count = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self.support, self._in_cells = weight.support, simd(device)
+        self.cells: Cells | None = None
+        self.grid: Any = None
+        self._equip()
         self.rows = neighbour_structure(space)()
         self.rows.box = self.box
         self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
@@ -181,6 +176,24 @@ class NeighbourLists:
         self._total, self._h_max = self.rows.start[n:], wp.zeros(1, dtype=space.real, device=device)
         self._builds = 0
         self._reserve(0)
+
+    def _equip(self) -> None:
+        """Allocate what a search needs besides the lists."""
+        n, space, device = len(self.h), self.space, self.device
+        if self._in_cells:
+            self.cells = Cells(space, self.support, self.h, self.body, self.box, device)
+        else:
+            side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
+            self.grid = wp.HashGrid(
+                side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
+            )
+        self.padded = wp.zeros(n, dtype=vector_type(3, space.real), device=device)
+        self.count = wp.zeros(n + 1, dtype=wp.int32, device=device)
+
+    def release(self) -> None:
+        """Free what a search needs besides the lists; the next search allocates it again."""
+        self._launch.forget()
+        self.cells = self.grid = self.padded = self.count = None
 
     @property
     def capacity(self) -> int:
@@ -213,10 +226,12 @@ class NeighbourLists:
     def count_neighbours(self, x: wp.array) -> None:
         """How many neighbours each particle has in ``x``; launches only, as is all of ``build`` but ``make_room``."""
         n = len(x)
-        if self.cells is None or self.space.periodic:
+        if self.padded is None:
+            self._equip()
+        if not self._in_cells or self.space.periodic:
             self._h_max.zero_()
             self._launch(_make_longest(self.space), n, [self.h, self._h_max])
-        last = 0 if self.cells is None else 3 - self.space.dim
+        last = 3 - self.space.dim if self._in_cells else 0
         self._launch(_make_pad(self.space, last), n, [x, self.box, self.padded])
         if self.cells is not None:
             self.cells.sort(self.padded)
@@ -258,7 +273,7 @@ class NeighbourLists:
 
     def _measure(self) -> None:
         """Note the largest smoothing length of the last count; reads the device."""
-        if self.cells is not None and not self.space.periodic:
+        if self._in_cells and not self.space.periodic:
             return
         self._longest = float(self._h_max.numpy()[0])  # cells of the next grid: any size is right, this one is fast
         for i, length in enumerate(float(length) for length in self.box):

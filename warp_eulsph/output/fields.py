@@ -4,12 +4,13 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
+import warp as wp
 
 from ..fields import PARTICLES, STATE
 from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
 from ..simulation import Simulation
 from ..transport import Transport
-from .stress import cauchy_stress
+from .stress import stress_array
 
 #: What can be recorded.
 Recorded = Simulation | Transport
@@ -25,18 +26,22 @@ class SnapshotField(NamedTuple):
     values: Callable[..., np.ndarray] = lambda source: source
 
 
-#: What fields are made of: copied from the device while the run waits, where what is made of them is not.
-SOURCES: dict[str, Callable[[Any], np.ndarray]] = {
-    "x": lambda simulation: simulation.x,
-    "v": lambda simulation: simulation.v,
-    "F": lambda simulation: simulation.F,
-    "J": lambda simulation: simulation.J,
-    "stress": cauchy_stress,
-    "mass": lambda simulation: simulation.order.by_number(simulation.particles.mass.numpy()),
-    "V0": lambda simulation: simulation.order.by_number(simulation.particles.V0.numpy()),
-    "body": lambda simulation: simulation.order.by_number(simulation.particles.body.numpy()),
-    "share": lambda simulation: simulation.order.by_number(simulation.particles.share.numpy()),
-    "h": lambda simulation: simulation.order.by_number(simulation.particles.h.numpy()),
+def _positions(simulation: Recorded) -> wp.array:
+    return simulation.stepper.U.x if isinstance(simulation, Simulation) else simulation.configuration.fields.x
+
+
+#: What fields are made of: arrays of the device, by place, to be copied, or of the host, by number, made for it.
+SOURCES: dict[str, Callable[[Any], wp.array | np.ndarray]] = {
+    "x": _positions,
+    "v": lambda simulation: simulation.stepper.U.v,
+    "F": lambda simulation: simulation.stepper.U.F,
+    "J": lambda simulation: simulation.diagnostics.volume_ratios(simulation.stepper.U),
+    "stress": stress_array,
+    "mass": lambda simulation: simulation.particles.mass,
+    "V0": lambda simulation: simulation.particles.V0,
+    "body": lambda simulation: simulation.particles.body,
+    "share": lambda simulation: simulation.particles.share,
+    "h": lambda simulation: simulation.particles.h,
     "particle": lambda simulation: np.arange(len(simulation.particles.mass), dtype=np.int32),
     "U": lambda transport: transport.values,
     "exact": lambda transport: transport.exact_values,

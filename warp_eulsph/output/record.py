@@ -22,6 +22,7 @@ from .log import append, cut, look
 from .probes import Measure
 from .recording import Recording
 from .series import SnapshotWriter
+from .snapshot import Frame
 from .stopping import Stop
 from .tables import Table
 from .worker import Worker
@@ -192,12 +193,14 @@ class _Recorder:
         self.checkpoints = Checkpoints(home.checkpoints)
         self.description, self.environment = description, environment(simulation)
         self.lines: list[dict[str, Any]] = []
+        self.coming: Frame | None = None  # on its way from the device
         self.worker = Worker()
         self.flushed = self.checked = time.monotonic()
 
     @property
     def last(self) -> Any:
         """Path of the last snapshot, for the message of a run that fails."""
+        self._forward()
         self.worker.drain()
         return self.snapshots.last
 
@@ -245,9 +248,11 @@ class _Recorder:
         """Queue what is due now, or everything."""
         simulation, recording = self.simulation, self.recording
         t, step, now = simulation.t, simulation.steps, time.monotonic()
+        self._forward()
         if everything or recording.snapshots.due(t, step):
-            frame = self.snapshots.collect(simulation)
-            self.worker.submit(lambda: self.snapshots.commit(frame))
+            self.coming = self.snapshots.collect(simulation)
+            if not self.coming.on_its_way:
+                self._forward()
         if everything or recording.log.due(t, step):
             self.lines.append(look(simulation))
         for probe, measure, table in self.probes:
@@ -261,11 +266,19 @@ class _Recorder:
 
     def checkpoint(self) -> None:
         """Queue all that waits, then a checkpoint: what it follows is on disk before it."""
+        self._forward()
         self._flush_lines()
         self._flush_tables(1)
         taken = take(self.simulation, self.description, self.environment)
         self.worker.submit(lambda: self.checkpoints.write(taken))
         self.checked = time.monotonic()
+
+    def _forward(self) -> None:
+        """Queue the frame that was on its way while steps were taken."""
+        frame, self.coming = self.coming, None
+        if frame is not None:
+            frame.wait()
+            self.worker.submit(lambda: self.snapshots.commit(frame))
 
     def _flush_lines(self) -> None:
         lines, self.lines, self.flushed = self.lines, [], time.monotonic()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .atomic import replace_file
+from .copies import Copies
 from .directory import RunDirectory
 from .fields import Recorded, known_fields
 from .manifest import Manifest, entry_of
@@ -56,6 +57,7 @@ class SnapshotWriter:
         if particles is not None and self.fields is not None and "particle" not in self.fields:
             self.fields = (*self.fields, "particle")
         self._indexed = 0
+        self._copies: Copies | None = None
         if not resume:
             RunDirectory(self.directory).abandon()
         (self.directory / "snap").mkdir(parents=True, exist_ok=True)
@@ -84,14 +86,18 @@ class SnapshotWriter:
         Raises:
             OSError: the disk refused; the files written before are whole.
         """
-        return self.commit(self.collect(simulation))
+        frame = self.collect(simulation)
+        frame.wait()
+        return self.commit(frame)
 
     def collect(self, simulation: Recorded) -> Frame:
-        """The present state, copied, for ``commit`` to write."""
-        return collect(simulation, self.fields, self.particles)
+        """The present state, for ``commit`` to write once its ``wait`` was called."""
+        if self._copies is None or self._copies.device != simulation.device:
+            self._copies = Copies(simulation.device)
+        return collect(simulation, self.fields, self.particles, self._copies)
 
     def commit(self, frame: Frame) -> Path:
-        """Write a frame collected before; the path of its file.
+        """Write a frame collected before, and release it; the path of its file.
 
         Raises:
             OSError: the disk refused; the files written before are whole.
@@ -99,6 +105,7 @@ class SnapshotWriter:
         name, content = f"snap/{frame.step:010d}.vtkhdf", encode(frame, self.dtype)
         replace_file(self.directory / name, content)
         self.manifest.add(entry_of(name, frame.step, frame.time, len(frame.x), content))
+        frame.release()
         self._write_series()
         if len(self.manifest.entries) > _GROWTH * self._indexed:
             self._write_index()

@@ -1,5 +1,6 @@
 """One frame, one immutable file: plain HDF5 that is a static VTKHDF PolyData too (ParaView, VTK, PyVista, h5py)."""
 
+import functools
 import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -8,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from ..fields import STATE
 from .atomic import replace_file
+from .copies import Copies, Copy
 from .fields import SOURCES, Recorded, SnapshotField, chosen_fields
 from .stress import padded
 
@@ -36,18 +39,38 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Frame:
-    """A state on the host, ready to be written while the simulation goes on.
+    """A state on the host or on its way there, to be written while the simulation goes on.
 
     Attributes:
         time: [s]. step: steps taken. dim: dimension.
-        fields: to write, by name. sources: what they are made of, (n, …) each, with the positions ``x`` [m].
+        fields: to write, by name. copies: what they are made of, (n, …) each, with the positions ``x`` [m].
     """
 
     time: float
     step: int
     dim: int
     fields: Mapping[str, SnapshotField]
-    sources: dict[str, np.ndarray]
+    copies: Mapping[str, Copy]
+
+    @property
+    def on_its_way(self) -> bool:
+        """Whether ``wait`` has yet to be called."""
+        return any(copy.on_its_way for copy in self.copies.values())
+
+    def wait(self) -> None:
+        """Wait until all of it is on the host."""
+        for copy in self.copies.values():
+            copy.wait()
+
+    def release(self) -> None:
+        """Leave the memory to later frames."""
+        for copy in self.copies.values():
+            copy.release()
+
+    @functools.cached_property
+    def sources(self) -> dict[str, np.ndarray]:
+        """What the fields are made of, (n, …) each."""
+        return {name: copy.values for name, copy in self.copies.items()}
 
     @property
     def x(self) -> np.ndarray:
@@ -60,13 +83,25 @@ class Frame:
         return {name: field.values(*(held[source] for source in field.sources)) for name, field in self.fields.items()}
 
 
-def collect(simulation: Recorded, names: Iterable[str] | None, particles: np.ndarray | None = None) -> Frame:
-    """What the fields of these ``names``, all if None, are made of in the present state, copied; of all ``particles``
-    if None."""
-    fields, chosen = chosen_fields(names, simulation), slice(None) if particles is None else particles
+def collect(
+    simulation: Recorded, names: Iterable[str] | None, particles: np.ndarray | None = None, copies: Copies | None = None
+) -> Frame:
+    """What the fields of these ``names``, all if None, are made of in the present state, of all ``particles`` if None.
+
+    ``copies`` makes the copies, which may be on their way then; without it all is there.
+    """
+    fields, places = chosen_fields(names, simulation), simulation.order.places
+    numbers = np.arange(len(places)) if particles is None else particles
     needed = dict.fromkeys(["x", *(source for field in fields.values() for source in field.sources)])
-    sources = {name: SOURCES[name](simulation)[chosen] for name in needed}
-    return Frame(simulation.t, simulation.steps, simulation.space.dim, fields, sources)
+    taken = Copies(simulation.device) if copies is None else copies
+    sources = {}
+    for name in needed:
+        source = SOURCES[name](simulation)
+        sources[name] = taken.take(source, places[numbers] if isinstance(source, wp.array) else numbers)
+    frame = Frame(simulation.t, simulation.steps, simulation.space.dim, fields, sources)
+    if copies is None:
+        frame.wait()
+    return frame
 
 
 def checked_precision(dtype: Any) -> np.dtype:

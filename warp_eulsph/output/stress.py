@@ -67,8 +67,8 @@ def stresses(space: Space, n: int, device: Any) -> wp.array:
     return wp.empty(n, dtype=matrix_type(3, 3, space.real), device=device)
 
 
-def cauchy_stress(simulation: Simulation) -> np.ndarray:
-    """σ = P(F) Fᵀ / J [Pa] of the present state, (n, 3, 3): M1 with the present configuration as reference.
+def stress_array(simulation: Simulation) -> wp.array:
+    """σ = P(F) Fᵀ / J [Pa] of the present state by place, (n,) of 3 × 3: M1, the reference being the present.
 
     In 2-D and 1-D the 3-D law acts on F with the missing stretches equal to one, so σ33 of plane strain is there too.
     """
@@ -76,4 +76,9 @@ def cauchy_stress(simulation: Simulation) -> np.ndarray:
     sigma = stresses(space, len(F), simulation.device)
     for body in simulation.bodies:
         body_stress(space, body.material, simulation.ranges[body.name], F, sigma)
-    return simulation.order.by_number(sigma.numpy())
+    return sigma
+
+
+def cauchy_stress(simulation: Simulation) -> np.ndarray:
+    """``stress_array`` on the host, by number, (n, 3, 3)."""
+    return simulation.order.by_number(stress_array(simulation).numpy())

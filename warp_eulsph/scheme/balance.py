@@ -77,13 +77,16 @@ class Balance:
 def _make_renew(space: Space) -> Any:
     """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13)."""
     real, vec = space.real, space.vec
-    face = float(space.dim - 1) / float(space.dim)
-    Reference = structure(space, "Reference")
+    Reference, dim = structure(space, "Reference"), space.dim
+    most = OPENED**dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def renew(first: int, reference: Reference, defect: wp.array(dtype=vec), surface: wp.array(dtype=vec)):
         a = first + wp.tid()
-        if wp.length(defect[a]) > real(OPENED) * wp.pow(reference.V[a], real(face)):
+        opening = wp.length(defect[a])  # |d|ᵈ/Vᵈ⁻¹, the d-th power of |d| over the face: no root to take
+        for _ in range(wp.static(dim - 1)):
+            opening *= wp.length(defect[a]) / reference.V[a]
+        if opening > real(most):
             surface[a] = surface[a] + defect[a]
             defect[a] = vec()
 

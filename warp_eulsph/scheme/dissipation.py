@@ -115,12 +115,18 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
 class UpwindForces(Stabiliser):
     """M9 alone, for references that need no correction."""
 
+    corrects = False
+
     def __init__(self, space: Space, device: Any):
         self.space, self.device, self._launch = space, device, Launcher(device)
         self._in_one_pass: PairForces | None = None
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Nothing to prepare: M9 needs the lists only."""
+
+    def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
+        """The portable kernels do, the SIMD pass makes its own."""
+        return sensed or not configuration.simd
 
     def compute(
         self,
@@ -133,7 +139,7 @@ class UpwindForces(Stabiliser):
         forces: Any,
     ) -> None:
         """Internal force (M5) and dissipation (M9) into ``forces``."""
-        if configuration.simd and sensor is None:
+        if not self.takes_dual(configuration, sensor is not None):
             if self._in_one_pass is None:
                 self._in_one_pass = PairForces(self.space, len(v), self.device)
             self._in_one_pass.compute(configuration, flux, v, grad_v, epsilon, forces)

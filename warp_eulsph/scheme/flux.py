@@ -9,10 +9,10 @@ import warp as wp
 from ..atomics import raise_to
 from ..execution import Launcher
 from ..fields import allocate, clock_structure, structure
-from ..linalg import det, inverse, symmetric_bounds
+from ..linalg import det, inverse, largest_shortening
 from ..materials import Law, Material
 from ..space import Space
-from .reference import Always, Every, ReferencePolicy
+from .reference import Always, Configuration, Every, ReferencePolicy, resolution
 
 
 @functools.cache
@@ -29,25 +29,25 @@ def stress_in_reference(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_flux(space: Space, law: Law) -> Any:
+def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> Any:
     mat = space.mat
     Reference, Flux, Constants = structure(space, "Reference"), structure(space, "Flux"), law.Constants
-    Q_of = stress_in_reference(space, law)
+    P_of, Q_of = law.stress, stress_in_reference(space, law)
 
     @wp.kernel(module="unique", enable_backward=False)
     def compute_flux(first: int, F: wp.array(dtype=mat), reference: Reference, c: Constants, flux: Flux):
         a = first + wp.tid()
-        Q = Q_of(F[a], reference.F[a], c)
+        Q = mat()
+        if wp.static(fixed):
+            Q = P_of(F[a], c)
+        else:
+            Q = Q_of(F[a], reference.F[a], c)
         flux.Q[a] = Q
-        flux.Pi[a] = Q @ wp.transpose(reference.L[a])
+        if wp.static(dual):
+            flux.Pi[a] = Q @ wp.transpose(reference.L[a])
 
     return compute_flux
 
-
-# Largest eigenvalue of L_a that the Courant number allows for: 3.7 in corners of 2-D lattices, 4.7 in 3-D ones. The
-# highest frequency of M5 on M4 grows with its root, so that a particle with a poorer neighbourhood asks for a smaller
-# step: without this the punch at 40² fails.
-LOPSIDED = 4.0
 
 # Largest |∇v| Δt over the Courant number. Single particles can outrun the waves where an arrangement is lost, and would
 # pass through their neighbours in one step: without this the punch at 50² to 90² fails now and then.
@@ -55,12 +55,12 @@ STRAIN = 0.25
 
 
 @functools.cache
-def _make_wave_speeds(space: Space, law: Law) -> Any:
+def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
     real, mat = space.real, space.mat
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
-    Clock, Constants = clock_structure(space), law.Constants
-    invert, moduli, bounds = inverse(space), law.wave_moduli, symmetric_bounds(space)
-    raise_rate = raise_to(real)
+    Clock, Constants, dim = clock_structure(space), law.Constants, float(space.dim)
+    invert, moduli, shortening_of = inverse(space), law.wave_moduli, largest_shortening(space)
+    raise_rate, resolution_of = raise_to(real), resolution(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
@@ -75,21 +75,29 @@ def _make_wave_speeds(space: Space, law: Law) -> Any:
     ):
         a = first + wp.tid()
         # A wave of speed c runs at c |G⁻¹| when distances are measured in the reference, G = F F_k⁻¹.
-        G_inverse = reference.F[a] @ invert(F[a])
-        shortening = wp.sqrt(bounds(wp.transpose(G_inverse) @ G_inverse)[1])
-        rho_0 = particles.mass[a] / particles.V0[a]
+        G = F[a]
+        if wp.static(not fixed):
+            G = G @ invert(reference.F[a])
+        shortening = shortening_of(G)  # squared
         M = moduli(F[a], c)
-        speed = wp.sqrt(wp.max(M[0], real(0.0)) / rho_0) * shortening
-        shear_speed = wp.sqrt(wp.max(M[1], real(0.0)) / rho_0) * shortening
+        per_density = shortening * particles.V0[a] / particles.mass[a]
+        speed = wp.sqrt(wp.max(M[0], real(0.0)) * per_density)
+        shear_speed = wp.sqrt(wp.max(M[1], real(0.0)) * per_density)
         rho_k = particles.mass[a] / reference.V[a]
         flux.speed[a] = speed
         flux.impedance[a] = rho_k * speed
         flux.shear_impedance[a] = rho_k * shear_speed
-        spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
-        lopsided = bounds((reference.L[a] + wp.transpose(reference.L[a])) * real(0.5))[1] / real(LOPSIDED)
-        wave_rate = speed * wp.sqrt(wp.max(lopsided, real(1.0))) / spacing
-        D = grad_v[a] @ G_inverse
-        raise_rate(clock.rate, wp.max(wave_rate, wp.sqrt(wp.ddot(D, D)) / real(STRAIN)))
+        rate = speed
+        if wp.static(fixed):
+            rate *= reference.resolution[a]
+        else:
+            rate *= resolution_of(a, particles, reference)
+        # |∇v G⁻¹| ≤ |∇v| |G⁻¹| and, of the bound, |G⁻¹|² ≤ d · shortening: seldom is more than that asked for
+        strain_rate = real(STRAIN) * rate
+        if wp.ddot(grad_v[a], grad_v[a]) * shortening * real(dim) > strain_rate * strain_rate:
+            D = grad_v[a] @ invert(G)
+            rate = wp.max(rate, wp.sqrt(wp.ddot(D, D)) / real(STRAIN))
+        raise_rate(clock.rate, rate)
 
     return wave_speeds
 
@@ -179,7 +187,7 @@ class Flux:
             history = wp.zeros(count, dtype=space.row(law.history), device=device) if law.history else None
             self.parts.append(_Part(first, count, law, constants, history))
             first += count
-        self.fields = allocate(space, "Flux", first, device)
+        self.fields = allocate(space, "Flux", first, device, empty=("Pi",))
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.histories = [part.history for part in self.parts]
 
@@ -187,18 +195,25 @@ class Flux:
         """The histories of the materials that have one, by body; what a checkpoint must hold."""
         return {f"Flux.history.{i}": history for i, history in enumerate(self.histories) if history is not None}
 
-    def compute(self, F: wp.array, reference: Any) -> None:
-        """Q and Π = Q L of the deformation gradients ``F`` (M1, M5)."""
-        for part in self.parts:
-            arguments = [F, reference, part.constants, self.fields]
-            self._launch(_make_flux(self.space, part.law), part.size, arguments, part.first)
+    def keep_dual(self) -> None:
+        """Have ``compute`` write Π too, for forces that take it from the array (M5)."""
+        if not len(self.fields.Pi):
+            self.fields.Pi = wp.zeros_like(self.fields.Q)
 
-    def wave_speeds(self, F: wp.array, grad_v: wp.array, reference: Any, clock: Any) -> None:
+    def compute(self, F: wp.array, configuration: Configuration) -> None:
+        """Q of the deformation gradients ``F`` (M1), and Π = Q Lᵀ (M5) if it is kept."""
+        for part in self.parts:
+            arguments = [F, configuration.fields, part.constants, self.fields]
+            kernel = _make_flux(self.space, part.law, configuration.fixed, len(self.fields.Pi) > 0)
+            self._launch(kernel, part.size, arguments, part.first)
+
+    def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
         """Wave speeds measured in the reference, and the largest rate of waves or strain [1/s] into ``clock.rate``."""
         clock.rate.zero_()
         for part in self.parts:
-            arguments = [F, grad_v, self.particles, reference, part.constants, self.fields, clock]
-            self._launch(_make_wave_speeds(self.space, part.law), part.size, arguments, part.first)
+            arguments = [F, grad_v, self.particles, configuration.fields, part.constants, self.fields, clock]
+            kernel = _make_wave_speeds(self.space, part.law, configuration.fixed)
+            self._launch(kernel, part.size, arguments, part.first)
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""

@@ -9,8 +9,8 @@ import warp as wp
 
 from ..boundaries import Bound
 from ..execution import Launcher
-from ..fields import allocate, arrays, clock_structure, structure
-from ..linalg import cofactor, inverse
+from ..fields import allocate, arrays, clock_structure, repeated, structure
+from ..linalg import cofactor, det
 from ..space import Space
 from .balance import Balance
 from .dissipation import Upwind, UpwindForces
@@ -57,6 +57,11 @@ class LaxWendroff:
         return LaxWendroffStepper(self, *parts)
 
 
+def is_corrected(options: Any, policy: ReferencePolicy, surface_given: bool) -> bool:
+    """Whether the scheme's correction is at work: a fixed reference needs it only where surface vectors were given."""
+    return options.correction is not None and (surface_given or not policy.fixed)
+
+
 def check_shifting(shifting: Shifting | None, correction: Any) -> None:
     """Raise ValueError unless the correction has the potentials that shifting follows."""
     if shifting is not None and not isinstance(correction, Balance):
@@ -64,11 +69,23 @@ def check_shifting(shifting: Shifting | None, correction: Any) -> None:
 
 
 @functools.cache
-def _make_predict(space: Space) -> Any:
+def moved_surface(space: Space) -> Any:
+    """``wp.func`` Nanson's rule: the area vector s moved from F to F_new, cof(F_new F⁻¹) s, without the inverse."""
+    vec, mat, determinant, cof = space.vec, space.mat, det(space), cofactor(space)
+
+    @wp.func
+    def moved_surface(s: vec, F: mat, F_new: mat) -> vec:
+        return cof(F_new) @ (wp.transpose(F) @ s) / determinant(F)
+
+    return moved_surface
+
+
+@functools.cache
+def _make_predict(space: Space, fixed: bool, surfaces: bool) -> Any:
     """Kernel: the half step, ``fraction`` = ½, from ``half`` = S(U) (M8); the one-step Lax scheme has 1."""
     real, mat = space.real, space.mat
     Particles, State, Forces = structure(space, "Particles"), structure(space, "State"), structure(space, "Forces")
-    Clock, invert, cof = clock_structure(space), inverse(space), cofactor(space)
+    Clock, moved = clock_structure(space), moved_surface(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def predict(
@@ -86,12 +103,13 @@ def _make_predict(space: Space) -> Any:
         tau = real(fraction * clock.dt[0])
         force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
         half.v[a] = half.v[a] + force * (tau / particles.mass[a])
-        dF = grad_v[a] @ smoothed_F_k[a] * tau
+        dF = grad_v[a] * tau
+        if wp.static(not fixed):
+            dF = dF @ smoothed_F_k[a]
         half.F[a] = half.F[a] + dF
         half.x[a] = state.x[a] + state.v[a] * tau
-        half.surface[a] = (
-            cof(wp.identity(n=wp.static(space.dim), dtype=real) + dF @ invert(state.F[a])) @ state.surface[a]
-        )
+        if wp.static(surfaces):
+            half.surface[a] = moved(state.surface[a], state.F[a], state.F[a] + dF)
 
     return predict
 
@@ -112,11 +130,11 @@ def _make_kick(space: Space) -> Any:
 
 
 @functools.cache
-def _make_drift(space: Space) -> Any:
+def _make_drift(space: Space, fixed: bool, surfaces: bool) -> Any:
     """Kernel: F, x and the surface vectors of ``state`` moved by ``fraction`` · Δt with velocity v (M8)."""
     real, vec, mat = space.real, space.vec, space.mat
     State, Reference, Clock = structure(space, "State"), structure(space, "Reference"), clock_structure(space)
-    invert, cof = inverse(space), cofactor(space)
+    moved = moved_surface(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def drift(
@@ -131,10 +149,13 @@ def _make_drift(space: Space) -> Any:
     ):
         a = first + wp.tid()
         tau = real(fraction * clock.dt[0])
-        dF = grad_v[a] @ reference.F[a] * tau
-        step = wp.identity(n=wp.static(space.dim), dtype=real) + dF @ invert(state.F[a])
-        out.surface[a] = cof(step) @ state.surface[a]
-        out.F[a] = state.F[a] + dF
+        dF = grad_v[a] * tau
+        if wp.static(not fixed):
+            dF = dF @ reference.F[a]
+        F_new = state.F[a] + dF
+        if wp.static(surfaces):
+            out.surface[a] = moved(state.surface[a], state.F[a], F_new)
+        out.F[a] = F_new
         out.x[a] = state.x[a] + v[a] * tau
 
     return drift
@@ -165,10 +186,14 @@ class LaxWendroffStepper:
         n, device = len(U.x), flux.device
         self.options, self.space, self.device, self.n = options, space, device, n
         self._launch = Launcher(device)
-        self.U, self.half = U, allocate(space, "State", n, device)
+        # A fixed reference has no use for surface vectors, and most conditions have none
+        self.moves_surfaces = not policy.fixed or any(condition.reads_surface for condition in conditions)
+        self.U, self.half = U, allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
+        if not self.moves_surfaces:
+            self.half.surface = U.surface
         self.particles, self.flux, self.configuration = particles, flux, configuration
         self.policy, self.clock, self.conditions = policy, clock, conditions
-        self.forces = allocate(space, "Forces", n, device)
+        self.forces = allocate(space, "Forces", n, device, empty=("correction", "external"))
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         self.shifter: Shifter | None = None
         if options.shifting is not None and not policy.fixed:
@@ -178,8 +203,16 @@ class LaxWendroffStepper:
         self.grad_F = wp.zeros(needed, dtype=space.row_gradient(space.dim**2), device=device)
         self.steps = 0
         self.stabiliser: Stabiliser = UpwindForces(space, device)
-        if options.correction is not None and (surface_given or not policy.fixed):
+        if is_corrected(options, policy, surface_given):
             self.stabiliser = options.correction.build(space, particles, flux, policy, device)
+        self._zero, self.loaded = wp.zeros(1, dtype=space.vec, device=device), any(c.loads for c in conditions)
+        # Forces that are always zero take the memory of one
+        for name, there in (("correction", self.stabiliser.corrects), ("external", self.loaded)):
+            force = wp.zeros(n, dtype=space.vec, device=device) if there else repeated(self._zero, n)
+            setattr(self.forces, name, force)
+        sensed = options.dissipation is not None and options.dissipation.sensor is not None
+        if self.stabiliser.takes_dual(configuration, sensed):
+            flux.keep_dual()
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:
             self.limiter = options.limiter.build(space, particles, configuration, device)
@@ -187,12 +220,12 @@ class LaxWendroffStepper:
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, particles, device) for sensor in sensors}
         self.smoothed_F_k = configuration.fields.F
-        if smoothing is not None and smoothing.smooths_reference:
+        if smoothing is not None and smoothing.smooths_reference and not policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
         self._impose(U, 0.0)
         configuration.refresh(U)
         if not surface_given:
-            configuration.defect(self.half.surface, U.surface)  # s_a = e_a at the start (M10), when half.surface is 0
+            configuration.defect(self.forces.free_v, U.surface)  # s_a = e_a at the start (M10), less nothing yet
         for condition in conditions:
             condition.start(U)
         self._after_refresh()
@@ -280,13 +313,14 @@ class LaxWendroffStepper:
         self._refresh_derived()
 
     def _refresh_derived(self) -> None:
+        self.configuration.resolve()
         if self.limiter is not None:
             self.limiter.refresh()
         if self.smoothed_F_k is not self.configuration.fields.F:
             self._smooth_field(self.configuration.fields.F, self.grad_F, self.smoothed_F_k)
 
     def _choose_dt(self, U: Any) -> None:
-        self.flux.wave_speeds(U.F, self.grad_v, self.configuration.fields, self.clock.fields)
+        self.flux.wave_speeds(U.F, self.grad_v, self.configuration, self.clock.fields)
         self.clock.choose()
 
     def _gradients(self, U: Any) -> None:
@@ -304,7 +338,7 @@ class LaxWendroffStepper:
         self.configuration.gradient(state.v, self.grad_v)
 
     def _stress(self, state: Any) -> None:
-        self.flux.compute(state.F, self.configuration.fields)
+        self.flux.compute(state.F, self.configuration)
 
     def _sum_forces(self, state: Any, v: wp.array, fraction: float) -> None:
         forces, configuration, options = self.forces, self.configuration, self.options
@@ -314,7 +348,8 @@ class LaxWendroffStepper:
             if options.dissipation.sensor is not None:
                 d = self.sensors[options.dissipation.sensor].d
         self.stabiliser.compute(configuration, self.flux.fields, v, self.grad_v, epsilon, d, forces)
-        forces.external.zero_()
+        if self.loaded:
+            forces.external.zero_()
         for condition in self.conditions:
             condition.load(state, self.clock.fields, fraction, forces.external)
 
@@ -324,7 +359,8 @@ class LaxWendroffStepper:
 
     def _predict(self, U: Any, half: Any, fraction: float) -> None:
         arguments = [self.particles, U, self.smoothed_F_k, self.grad_v, self.forces, self.clock.fields, fraction, half]
-        self._launch(_make_predict(self.space), self.n, arguments)
+        kernel = _make_predict(self.space, self.configuration.fixed, self.moves_surfaces)
+        self._launch(kernel, self.n, arguments)
 
     def _kick(self, U: Any) -> None:
         arguments = [self.particles, self.forces, self.clock.fields, U.v]
@@ -332,7 +368,8 @@ class LaxWendroffStepper:
 
     def _drift(self, U: Any, v: wp.array, fraction: float, out: Any) -> None:
         arguments = [self.configuration.fields, U, v, self.grad_v, self.clock.fields, fraction, out]
-        self._launch(_make_drift(self.space), self.n, arguments)
+        kernel = _make_drift(self.space, self.configuration.fixed, self.moves_surfaces)
+        self._launch(kernel, self.n, arguments)
 
     def _limit(self, U: Any) -> None:
         if self.limiter is not None:

@@ -8,8 +8,8 @@ import warp as wp
 
 from ..execution import Launcher
 from ..fields import clock_structure, structure
-from ..reduce import Sum
-from ..space import Space
+from ..reduce import Sum, SumOfParticles
+from ..space import Space, matrix_type, vector_type
 from .flux import Flux
 from .reference import Configuration
 from .time_step import DeviceClock
@@ -21,7 +21,7 @@ _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 @functools.cache
 def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
-    """Kernel: what each mechanism did to particle a in this step, by the mean velocity of the step.
+    """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
@@ -35,12 +35,14 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
         structure(space, "State"),
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
-    precise = wp.types.vector(length=space.dim, dtype=wp.float64)
-    precise_mat = wp.types.matrix(shape=(space.dim, space.dim), dtype=wp.float64)
+    precise = vector_type(space.dim, wp.float64)
+    precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
     def entries(
         first: int,
+        n: int,
+        each: int,
         particles: Particles,
         reference: Reference,
         state: State,
@@ -56,47 +58,53 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
         forces: Forces,
         out: wp.array(dtype=_Entry),
     ):
-        a = first + wp.tid()
+        block = first + wp.tid()
         dt = clock.dt[0]
-        mass = wide(particles.mass[a])
-        v = precise(state.v[a])
-        v_mean = wide(0.5) * (precise(v_old[a]) + v)
-        impulse = (v - precise(forces.free_v[a])) * mass
-        internal = precise(forces.internal[a])
-        strain_power = wide(reference.V[a]) * wp.ddot(precise_mat(Q[a]), precise_mat(grad_v[a]))
-        stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
-        limiter = wide(0.0)
-        if wp.static(limited):
-            limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
-            stepping -= dW_limited[a]
-        if wp.static(smoothed):
-            stepping += mass * wp.dot(precise(dv[a]), v_mean)
-        out[a] = wide(particles.share[a]) * _Entry(
-            dt * wp.dot(precise(forces.external[a]), v_mean),
-            wp.dot(impulse, v_mean),
-            dt * wp.dot(precise(forces.dissipation[a]), v_mean),
-            dt * wp.dot(precise(forces.correction[a]), v_mean),
-            limiter,
-            stepping,
-            wide(0.0),
-        )
-        if dt > wide(0.0):
-            forces.reaction[a] = vec(impulse / dt)
-        v_old[a] = state.v[a]
-        W_old[a] = W[a]
+        total = _Entry()
+        for a in range(block * each, wp.min((block + 1) * each, n)):
+            mass = wide(particles.mass[a])
+            v = precise(state.v[a])
+            v_mean = wide(0.5) * (precise(v_old[a]) + v)
+            impulse = (v - precise(forces.free_v[a])) * mass
+            internal = precise(forces.internal[a])
+            strain_power = wide(reference.V[a]) * wp.ddot(precise_mat(Q[a]), precise_mat(grad_v[a]))
+            stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
+            limiter = wide(0.0)
+            if wp.static(limited):
+                limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
+                stepping -= dW_limited[a]
+            if wp.static(smoothed):
+                stepping += mass * wp.dot(precise(dv[a]), v_mean)
+            total += wide(particles.share[a]) * _Entry(
+                dt * wp.dot(precise(forces.external[a]), v_mean),
+                wp.dot(impulse, v_mean),
+                dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+                dt * wp.dot(precise(forces.correction[a]), v_mean),
+                limiter,
+                stepping,
+                wide(0.0),
+            )
+            if dt > wide(0.0):
+                forces.reaction[a] = vec(impulse / dt)
+            v_old[a] = state.v[a]
+            W_old[a] = W[a]
+        out[block] = total
 
     return entries
 
 
 @functools.cache
 def _make_shift_entry(space: Space) -> Any:
-    """Kernel: kinetic and stored energy that a particle gained since the last entry, all of it by shifting (M15)."""
+    """Kernel of ``SumOfParticles``: energy gained since the last entry, all of it by shifting (M15)."""
     vec, Particles, State, wide = space.vec, structure(space, "Particles"), structure(space, "State"), wp.float64
-    precise = wp.types.vector(length=space.dim, dtype=wp.float64)
+    precise = vector_type(space.dim, wp.float64)
     last = len(ACCOUNTS) - 1
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift_entry(
+        first: int,
+        n: int,
+        each: int,
         particles: Particles,
         state: State,
         v_old: wp.array(dtype=vec),
@@ -104,14 +112,17 @@ def _make_shift_entry(space: Space) -> Any:
         W: wp.array(dtype=wide),
         out: wp.array(dtype=_Entry),
     ):
-        a = wp.tid()
-        v, before = precise(state.v[a]), precise(v_old[a])
-        gain = wide(0.5) * wide(particles.mass[a]) * wp.dot(v - before, v + before) + W[a] - W_old[a]
+        block = first + wp.tid()
+        total = wide(0.0)
+        for a in range(block * each, wp.min((block + 1) * each, n)):
+            v, before = precise(state.v[a]), precise(v_old[a])
+            gain = wide(0.5) * wide(particles.mass[a]) * wp.dot(v - before, v + before) + W[a] - W_old[a]
+            total += wide(particles.share[a]) * gain
+            v_old[a] = state.v[a]
+            W_old[a] = W[a]
         entry = _Entry()
-        entry[last] = wide(particles.share[a]) * gain
-        out[a] = entry
-        v_old[a] = state.v[a]
-        W_old[a] = W[a]
+        entry[last] = total
+        out[block] = entry
 
     return shift_entry
 
@@ -185,10 +196,9 @@ class Ledger:
         self._v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
         self._dW_limited = wp.zeros(n if limiter is not None else 0, dtype=wp.float64, device=device)
-        self._entries = wp.zeros(n, dtype=_Entry, device=device)
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy = wp.zeros(1, dtype=wp.float64, device=device)
-        self._sum_entries, self._sum = Sum(_Entry, n, device), Sum(wp.float64, n, device)
+        self._sum_entries, self._sum = SumOfParticles(_Entry, n, device), Sum(wp.float64, n, device)
         self.start = 0.0
 
     def open(self, U: Any) -> None:
@@ -222,20 +232,16 @@ class Ledger:
         if dv is None:
             dv = self.limiter.dv if self.limiter is not None else self._v_old
         arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
-        arguments += [self.clock.fields, forces, self._entries]
-        kernel = _make_entries(self.space, self.limiter is not None, smoothed is not None)
-        self._launch(kernel, len(self._W), arguments)
-        self._book()
+        arguments += [self.clock.fields, forces]
+        self._book(_make_entries(self.space, self.limiter is not None, smoothed is not None), arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
         self.flux.energy(U.F, self._W)
-        arguments = [self.particles, U, self._v_old, self._W_old, self._W, self._entries]
-        wp.launch(_make_shift_entry(self.space), len(self._W), arguments, device=self.device)
-        self._book()
+        self._book(_make_shift_entry(self.space), [self.particles, U, self._v_old, self._W_old, self._W])
 
-    def _book(self) -> None:
-        self._sum_entries(self._entries, self._step)
+    def _book(self, kernel: Any, arguments: list[Any]) -> None:
+        self._sum_entries(kernel, arguments, self._step)
         self._launch.once(_make_book(), 1, [self._step, self._total])
 
     def kinetic(self, U: Any) -> float:

@@ -19,7 +19,7 @@ def _vectors(space: Space) -> int:
 
 @functools.cache
 def _make_pack(space: Space) -> Any:
-    """Kernel: what the pass reads of a neighbour, side by side."""
+    """Kernel: what the pass reads of a neighbour, side by side; Π = Q Lᵀ (M5) is made here."""
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     first_grad, first_Pi = 8, 8 + 4 * dim
@@ -34,7 +34,8 @@ def _make_pack(space: Space) -> Any:
         rows: wp.array2d(dtype=real),
     ):
         a = first + wp.tid()
-        x_a, v_a, grad_a, Pi_a, balanced_a = reference.x[a], v[a], grad_v[a], flux.Pi[a], reference.balanced[a]
+        x_a, v_a, grad_a, balanced_a = reference.x[a], v[a], grad_v[a], reference.balanced[a]
+        Pi_a = flux.Q[a] @ wp.transpose(reference.L[a])
         rows[a, 3] = flux.impedance[a]
         rows[a, 7] = flux.shear_impedance[a]
         for i in range(wp.static(dim)):

@@ -11,7 +11,7 @@ import warp as wp
 
 from ..execution import Launcher, simd
 from ..fields import allocate, arrays, neighbour_structure, structure
-from ..linalg import det, inverse, symmetric_bounds
+from ..linalg import det, inverse, largest_shortening, stretch_bounds, stretch_of_volume, symmetric_bounds
 from ..operators.correction import make_correct, make_pair_sums, make_pair_sums_simd
 from ..operators.divergence import make_divergence
 from ..operators.gradient import make_gradient
@@ -112,42 +112,75 @@ LEAST_GROWTH, LARGEST_GROWTH = 0.5, 2.0
 
 
 @functools.cache
-def _make_adopt(space: Space) -> Any:
+def _make_adopt(space: Space, fixed: bool) -> Any:
     State, Particles, Reference = (
         structure(space, "State"),
         structure(space, "Particles"),
         structure(space, "Reference"),
     )
-    real, determinant, power = space.real, det(space), 1.0 / space.dim
+    real, determinant, stretch_of = space.real, det(space), stretch_of_volume(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def adopt(first: int, state: State, particles: Particles, reference: Reference):
         a = first + wp.tid()
         reference.x[a] = state.x[a]
-        reference.F[a] = state.F[a]
+        if wp.static(not fixed):
+            reference.F[a] = state.F[a]
         reference.balanced[a] = state.x[a]
         J = determinant(state.F[a])
         reference.V[a] = J * particles.V0[a]
-        growth = wp.pow(wp.max(J, real(0.0)), real(power))
-        reference.h[a] = particles.h[a] * wp.clamp(growth, real(LEAST_GROWTH), real(LARGEST_GROWTH))
+        reference.h[a] = particles.h[a] * wp.clamp(stretch_of(J), real(LEAST_GROWTH), real(LARGEST_GROWTH))
 
     return adopt
+
+
+# Largest eigenvalue of L_a that the Courant number allows for: 3.7 in corners of 2-D lattices, 4.7 in 3-D ones. The
+# highest frequency of M5 on M4 grows with its root, so that a particle with a poorer neighbourhood asks for a smaller
+# step: without this the punch at 40² fails.
+LOPSIDED = 4.0
+
+
+@functools.cache
+def resolution(space: Space) -> Any:
+    """``wp.func`` of particle a what the Courant number counts by [1/m]: 1/spacing, more where L is large."""
+    real, bounds = space.real, symmetric_bounds(space)
+    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+
+    @wp.func
+    def resolution(a: int, particles: Particles, reference: Reference) -> real:
+        L = reference.L[a]
+        lopsided = bounds((L + wp.transpose(L)) * real(0.5))[1] / real(LOPSIDED)
+        spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
+        return wp.sqrt(wp.max(lopsided, real(1.0))) / spacing
+
+    return resolution
+
+
+@functools.cache
+def _make_resolve(space: Space) -> Any:
+    """Kernel: ``resolution`` of a fixed reference."""
+    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+    resolution_of = resolution(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def resolve(first: int, particles: Particles, reference: Reference):
+        a = first + wp.tid()
+        reference.resolution[a] = resolution_of(a, particles, reference)
+
+    return resolve
 
 
 @functools.cache
 def _make_distortion(space: Space) -> Any:
     real, mat = space.real, space.mat
     Reference = structure(space, "Reference")
-    invert, bounds = inverse(space), symmetric_bounds(space)
+    invert, bounds, shortening_of = inverse(space), stretch_bounds(space), largest_shortening(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def distortion(F: wp.array(dtype=mat), reference: Reference, largest: wp.array(dtype=real)):
         a = wp.tid()
         G = F[a] @ invert(reference.F[a])
-        G_inverse = reference.F[a] @ invert(F[a])
-        stretch = bounds(wp.transpose(G) @ G)[1]
-        shortening = bounds(wp.transpose(G_inverse) @ G_inverse)[1]
-        wp.atomic_max(largest, 0, wp.sqrt(wp.max(stretch, shortening)))
+        wp.atomic_max(largest, 0, wp.sqrt(wp.max(bounds(G)[1], shortening_of(G))))
 
     return distortion
 
@@ -184,6 +217,12 @@ def _make_defect(space: Space) -> Any:
 class Configuration:
     """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
 
+    Args:
+        box: lengths of the periodic box [m], zero where open.
+        fixed: the initial configuration stays the reference, F_k = I.
+        corrected: something changes L or the pair vectors after M3 (M10 to M13). Where nothing does and the reference
+            is fixed, arrays of the same values are one.
+
     Attributes:
         fields: struct ``Reference`` of ``fields.py``.
         lists: neighbour lists, with the pair weights g_ab.
@@ -191,13 +230,26 @@ class Configuration:
         simd: whether sums over neighbours run by SIMD kernels.
     """
 
-    def __init__(self, space: Space, weight: Weight, particles: Any, box: Any, device: Any):
+    def __init__(
+        self,
+        space: Space,
+        weight: Weight,
+        particles: Any,
+        box: Any,
+        device: Any,
+        *,
+        fixed: bool = False,
+        corrected: bool = True,
+    ):
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
+        self.fixed, self._plain = fixed, fixed and not corrected
         self.simd, self._launch = simd(device), Launcher(device)
-        self.fields = allocate(space, "Reference", n, device)
+        self.fields = allocate(space, "Reference", n, device, empty=("F",) if fixed else ("resolution",))
+        if self._plain:
+            self.fields.balanced = self.fields.x
         self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device)
-        self.K = wp.zeros(n, dtype=space.mat, device=device)
+        self.K = self.fields.L if self._plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
         self._interpolations: dict[Values, Interpolation] = {}
@@ -216,23 +268,46 @@ class Configuration:
 
     def move(self, state: Any) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
-        self._launch(_make_adopt(self.space), len(state.x), [state, self.particles, self.fields])
+        self._launch(_make_adopt(self.space, self.fixed), len(state.x), [state, self.particles, self.fields])
         self.lists.count_neighbours(self.fields.x)
 
     def renew(self) -> None:
         """Last part of a refresh, launches only: the neighbours, pair weights and corrections (M3)."""
         self.lists.fill(self.fields.x)
         self._weigh()
-        self._launch(make_correct(self.space), len(self.K), [self.K, self.fields, self.poor])
+        self._correct()
+        self._settle()
 
     def evolving(self) -> dict[str, wp.array]:
         """The reference's arrays by name: what a checkpoint must hold; ``rebuild`` derives the rest from them."""
-        return arrays(self.fields, "Reference")
+        held = arrays(self.fields, "Reference")
+        held.pop("Reference.resolution")
+        if self.fixed:
+            held.pop("Reference.F")
+        if self._plain:
+            held.pop("Reference.balanced")
+        return held
 
     def rebuild(self) -> None:
         """Neighbours, pair weights, K_a (M3) and interpolations of the positions, volumes and h in ``fields``."""
         self.lists.build(self.fields.x)
         self._weigh()
+        if self.K is self.fields.L:
+            self._correct()
+        self._settle()
+
+    def _settle(self) -> None:
+        if self.fixed:
+            self.lists.release()
+
+    def _correct(self) -> None:
+        arguments = [self.K, self.fields, self.poor]
+        self._launch(make_correct(self.space), len(self.K), arguments)
+
+    def resolve(self) -> None:
+        """Once L is what it stays: what the Courant number counts by, kept where the reference is fixed."""
+        if self.fixed:
+            self._launch(_make_resolve(self.space), len(self.K), [self.particles, self.fields])
 
     def _weigh(self) -> None:
         pair_sums = (make_pair_sums_simd if self.simd else make_pair_sums)(self.weight, self.space)
@@ -254,7 +329,13 @@ class Configuration:
         self._launch(kernel, len(f), [self.fields, self.near, f, out])
 
     def divergence(self, Pi: wp.array, out: wp.array) -> None:
-        """``out`` ← −T, the dual divergence (M5) of Π = Q Lᵀ, (n,) of vec."""
+        """``out`` ← −T, the dual divergence (M5) of Π = Q Lᵀ, (n,) of vec.
+
+        Raises:
+            ValueError: a Π that was not kept.
+        """
+        if len(Pi) != len(out):
+            raise ValueError(f"Pi must be of {len(out)} particles, got {len(Pi)}; Flux.keep_dual() has it computed")
         self._launch(make_divergence(self.space, self.simd), len(out), [self.fields, self.near, Pi, out])
 
     def defect(self, surface: wp.array, out: wp.array) -> None:

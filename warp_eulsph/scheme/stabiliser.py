@@ -1,7 +1,7 @@
 """What keeps the sums of a reference stable: dissipation, and the correction of what the arrangement gets wrong."""
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
@@ -11,9 +11,16 @@ from .reference import Configuration
 class Stabiliser(ABC):
     """The stabilising forces at work on one set of particles."""
 
+    #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
+    corrects: ClassVar[bool] = True
+
     @abstractmethod
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Prepare for a new reference."""
+
+    def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
+        """Whether ``compute``, with a sensor or without, takes Π from the array of the flux (M5)."""
+        return True
 
     def evolving(self) -> dict[str, wp.array]:
         """Arrays by name that live from step to step: what a checkpoint must hold."""

@@ -56,6 +56,10 @@ class SurfaceForces(Stabiliser):
         """The defect e_a − s_a of the new reference."""
         configuration.defect(state.surface, self.defect)
 
+    def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
+        """As the forces that are corrected do."""
+        return self.upwind.takes_dual(configuration, sensed)
+
     def evolving(self) -> dict[str, wp.array]:
         """The defect: of the surface vectors at the last refresh, which are not kept."""
         return {"SurfaceForces.defect": self.defect}

@@ -85,11 +85,12 @@ def _accelerate(simulation: Simulation, v: wp.array) -> np.ndarray:
     stepper, configuration = simulation.stepper, simulation.stepper.configuration
     grad_v, force = _gradient(simulation, v).numpy(), np.zeros(simulation.v.shape)
     out = wp.zeros_like(v)
+    stepper.flux.keep_dual()
     for sign in (1.0, -1.0):
         F = wp.array(
             simulation.F + sign * DIFFERENCE * grad_v @ simulation.F, dtype=simulation.space.mat, device=v.device
         )
-        stepper.flux.compute(F, configuration.fields)
+        stepper.flux.compute(F, configuration)
         configuration.divergence(stepper.flux.fields.Pi, out)
         force += sign / (2.0 * DIFFERENCE) * out.numpy()
     return force

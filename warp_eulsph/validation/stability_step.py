@@ -168,11 +168,11 @@ class Step:
             for field in (particles.h, particles.spacing):
                 field.assign(field.numpy() / volume ** (1.0 / point.dim))
             configuration.refresh(stepper.U)
-        flux.wave_speeds(stepper.U.F, stepper.grad_v, configuration.fields, simulation.clock.fields)
+        flux.wave_speeds(stepper.U.F, stepper.grad_v, configuration, simulation.clock.fields)
         self.speed = float(flux.fields.speed.numpy().max())
         self.dt = point.cfl / float(simulation.clock.fields.rate.numpy()[0])
         simulation.clock.option = TimeStep(fixed=self.dt)
-        flux.compute(stepper.U.F, configuration.fields)
+        flux.compute(stepper.U.F, configuration)
         self.stress = flux.fields.Q.numpy()[0].copy()
         self.modulus = simulation.particles.mass.numpy()[0] / configuration.fields.V.numpy()[0] * self.speed**2
 
