@@ -163,14 +163,14 @@ def spread_of_invariants(space: Space) -> Any:
 
         return no_spread
 
-    d, others, second = float(space.dim), float(space.dim - 1), 2.0 * space.dim / (space.dim - 1)
+    share, second = (space.dim - 1) / space.dim, 2.0 * space.dim / (space.dim - 1)
 
     @wp.func
     def spread_of_invariants(A_A: real, C_C: real, J: real) -> real:
         of_pairs = J * J
         if wp.static(space.dim == 3):
             of_pairs = C_C
-        return real(others) / real(d) * wp.sqrt(wp.max(A_A * A_A - real(second) * of_pairs, real(0.0)))
+        return real(share) * wp.sqrt(wp.max(A_A * A_A - real(second) * of_pairs, real(0.0)))
 
     return spread_of_invariants
 
@@ -179,16 +179,15 @@ def spread_of_invariants(space: Space) -> Any:
 def stretch_bounds(space: Space) -> Any:
     """``wp.func`` bounds (least, largest) of the squared principal stretches of A, the eigenvalues of A Aᵀ.
 
-    Those of ``symmetric_bounds``, from the invariants of the product instead of the product. (A Python number becomes a
-    constant in float32: fractions such as 1/d are divided in the kernel.)
+    Those of ``symmetric_bounds``, from the invariants of the product instead of the product.
     """
-    real, mat, pair, d = space.real, space.mat, space.row(2), float(space.dim)
+    real, mat, pair, share = space.real, space.mat, space.row(2), 1.0 / space.dim
     determinant, cof, spread_of = det(space), cofactor(space), spread_of_invariants(space)
 
     @wp.func
     def stretch_bounds(A: mat) -> pair:
         C = cof(A)
-        mean = wp.ddot(A, A) * (real(1.0) / real(d))
+        mean = wp.ddot(A, A) * real(share)
         spread = spread_of(wp.ddot(A, A), wp.ddot(C, C), determinant(A))
         return pair(mean - spread, mean + spread)
 
@@ -198,7 +197,7 @@ def stretch_bounds(space: Space) -> Any:
 @functools.cache
 def largest_shortening(space: Space) -> Any:
     """``wp.func`` bound of the largest squared principal stretch of A⁻¹, without the inverse."""
-    real, mat, d = space.real, space.mat, float(space.dim)
+    real, mat, share = space.real, space.mat, 1.0 / space.dim
     determinant, cof, spread_of = det(space), cofactor(space), spread_of_invariants(space)
 
     @wp.func
@@ -207,7 +206,7 @@ def largest_shortening(space: Space) -> Any:
         C = cof(A)
         rate = real(1.0) / determinant(A)
         A_A, C_C = wp.ddot(C, C) * rate * rate, wp.ddot(A, A) * rate * rate
-        return A_A * (real(1.0) / real(d)) + spread_of(A_A, C_C, rate)
+        return A_A * real(share) + spread_of(A_A, C_C, rate)
 
     return largest_shortening
 

@@ -61,6 +61,7 @@ def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: 
     determinant, cof, bounds = det(space), cofactor(space), stretch_bounds(space)
     coupled, shape_factor = largest_eigenvalue(real), isochoric(real)
     missing = float(3 - space.dim)  # stretches that are held at one
+    third = 1.0 / 3.0
 
     @wp.struct
     class Constants:
@@ -72,7 +73,7 @@ def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: 
         J = determinant(F)
         mu = c.mu * shape_factor(J)
         F_F = wp.ddot(F, F) + real(missing)
-        return F * mu + cof(F) * (c.kappa * pressure_slope(J) - mu / (real(3.0) * J) * F_F)
+        return F * mu + cof(F) * (c.kappa * pressure_slope(J) - mu * real(third) / J * F_F)
 
     @wp.func
     def energy(F: mat, c: Constants) -> real:
@@ -89,10 +90,9 @@ def isochoric_neo_hookean(space: Space, volumetric_energy: Any, pressure_slope: 
         mu = c.mu * shape_factor(J)
         trace = wp.ddot(F, F) + real(missing)
         b_range = bounds(F)
-        third = real(1.0) / real(3.0)
-        along = mu * (real(5.0) * third * third * trace - third * b_range[0]) + c.kappa * volumetric_modulus(J)
+        along = mu * (real(5.0) / real(9.0) * trace - real(third) * b_range[0]) + c.kappa * volumetric_modulus(J)
         across = mu * b_range[1]
-        mixed = mu * third * (b_range[1] - b_range[0])
+        mixed = mu * real(third) * (b_range[1] - b_range[0])
         return pair(coupled(along, mixed, across), across)
 
     return Law(Constants, stress, energy, wave_moduli)
