@@ -4,14 +4,12 @@ import errno
 import os
 import random
 import shutil
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from kept_runs import contents, plate, recording, run
+from kept_runs import contents, killed_until_done, plate, recording, run
 
 from warp_eulsph.output import DamagedError, read_snapshot, record
 from warp_eulsph.output.checkpoint import decode
@@ -25,31 +23,6 @@ def begin(directory, until):
     """Start or resume a run with checkpoints every few steps."""
     simulation = plate()
     record(simulation, directory, until, recording(simulation, checkpoint=0.02), resume=True)
-
-
-def killed_until_done(begin, kills, rng=None, after=lambda: None):
-    """Run ``begin`` in children, the first ``kills`` of them killed at random moments, until one ends; how many were.
-
-    ``after`` is called after each.
-    """
-    rng, killed = rng or random.Random(2), 0
-    while True:
-        child = os.fork()
-        if child == 0:  # a copy of this process, with its kernels loaded
-            try:
-                begin()
-            except BaseException:
-                os._exit(1)
-            os._exit(0)
-        time.sleep(rng.uniform(0.01, 0.25))
-        if killed < kills:
-            os.kill(child, signal.SIGKILL)
-        _, status = os.waitpid(child, 0)
-        after()
-        if not os.WIFSIGNALED(status):
-            assert os.WEXITSTATUS(status) == 0, "the resumed run failed"
-            return killed
-        killed += 1
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no fork")

@@ -1,13 +1,13 @@
 """Particles change places in memory, and nothing that a user sees does, but by round-off."""
 
 import logging
+import sys
 
 import numpy as np
 import pytest
 import warp as wp
 from clouds import cloud
-from kept_runs import StopAfter, contents
-from test_crash import killed_until_done
+from kept_runs import StopAfter, contents, killed_until_done
 from test_materials import Remembering
 from test_resume import REFERENCES, SCHEMES, bits, reachable
 
@@ -302,6 +302,7 @@ def kept(directory, until=1e-2, **options):
     return record(simulation, directory, until, recording, **options)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no fork")
 def test_stops_and_kills_between_sorts_leave_no_trace(tmp_path, monkeypatch):
     sorted_often(monkeypatch)
     whole = kept(tmp_path / "whole")

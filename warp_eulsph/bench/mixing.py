@@ -8,6 +8,7 @@ mixed cubes; then what a look at the order and a sort cost, in steps of the mixe
 """
 
 import argparse
+import functools
 import statistics
 import time
 from collections.abc import Callable
@@ -50,32 +51,33 @@ def stirred_cube(x: np.ndarray, side: int, sort: bool) -> Simulation:
 def compare(side: int, steps: int) -> dict[str, float]:
     """Rates [1/s] of the lattice and of the cubes after ``steps`` steps; costs of a look and a sort [steps]."""
     x = box((0.0,) * 3, (1.0,) * 3, 1.0 / side)[0]
-    found = {}
-    for name, sort in (("left", False), ("sorted", True)):
-        cube = stirred_cube(x, side, sort)
+    cubes = {"left": stirred_cube(x, side, sort=False), "sorted": stirred_cube(x, side, sort=True)}
+    for cube in cubes.values():
         cube.step(3)
-        found["lattice"] = rate(cube)
+    lattice = rates(cubes)
+    for cube in cubes.values():
         cube.step(steps)
-        found[name] = rate(cube)
-    step = len(x) / found["sorted"]
-    found["look"] = seconds(cube.sorting.parted) / step
-    found["sort"] = seconds(lambda: cube.sorting.permute(cube.sorting.sorted_places())) / step
-    return found
+    found = {"lattice": statistics.mean(lattice.values()), **rates(cubes)}
+    sorting, step = cubes["sorted"].sorting, len(x) / found["sorted"]
+    look = [seconds(sorting.parted) for _ in range(ROUNDS)]
+    sort = [seconds(lambda: sorting.permute(sorting.sorted_places())) for _ in range(ROUNDS)]
+    return found | {"look": statistics.median(look) / step, "sort": statistics.median(sort) / step}
+
+
+def rates(cubes: dict[str, Simulation]) -> dict[str, float]:
+    """Particle-steps per processor second, medians over rounds that take turns, for the machine has moods."""
+    spent: dict[str, list[float]] = {name: [] for name in cubes}
+    for _ in range(ROUNDS):
+        for name, cube in cubes.items():
+            spent[name].append(seconds(functools.partial(cube.step, STEPS_PER_ROUND)))
+    return {name: STEPS_PER_ROUND * len(cubes[name].x) / statistics.median(spent[name]) for name in cubes}
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """Processor seconds of one of several calls, the median."""
-    spent = []
-    for _ in range(ROUNDS):
-        start = time.process_time()
-        work()
-        spent.append(time.process_time() - start)
-    return statistics.median(spent)
-
-
-def rate(simulation: Simulation) -> float:
-    """Particle-steps per processor second, median over rounds."""
-    return STEPS_PER_ROUND * len(simulation.x) / seconds(lambda: simulation.step(STEPS_PER_ROUND))
+    """Processor seconds of a call."""
+    start = time.process_time()
+    work()
+    return time.process_time() - start
 
 
 def main(argv: list[str] | None = None) -> dict[str, float]:
