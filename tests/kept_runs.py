@@ -1,6 +1,10 @@
 """A small run with everything on, for the tests of run directories."""
 
 import json
+import os
+import random
+import signal
+import time
 
 import numpy as np
 
@@ -71,3 +75,28 @@ class StopAfter:
         if self.left and self.simulation is not None and self.simulation.steps >= self.left[0]:
             return f"step {self.left.pop(0)}"
         return None
+
+
+def killed_until_done(begin, kills, rng=None, after=lambda: None):
+    """Run ``begin`` in children, the first ``kills`` of them killed at random moments, until one ends; how many were.
+
+    ``after`` is called after each.
+    """
+    rng, killed = rng or random.Random(2), 0
+    while True:
+        child = os.fork()
+        if child == 0:  # a copy of this process, with its kernels loaded
+            try:
+                begin()
+            except BaseException:
+                os._exit(1)
+            os._exit(0)
+        time.sleep(rng.uniform(0.01, 0.25))
+        if killed < kills:
+            os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        after()
+        if not os.WIFSIGNALED(status):
+            assert os.WEXITSTATUS(status) == 0, "the resumed run failed"
+            return killed
+        killed += 1

@@ -86,6 +86,11 @@ def test_bodies_by_name_and_periodic_boxes():
     np.testing.assert_array_equal(simulation.conditions[0].indices, np.arange(16, 32))
 
 
+def test_particles_are_sorted_in_memory_unless_the_case_says_no():
+    assert parse_case(small()).build().sorting.on
+    assert not parse_case(small(sort=False)).build().sorting.on
+
+
 def test_meshes_are_found_beside_the_case_file(tmp_path):
     from test_meshes import angle_profile, write
 

@@ -4,14 +4,12 @@ import errno
 import os
 import random
 import shutil
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from kept_runs import contents, plate, recording, run
+from kept_runs import contents, killed_until_done, plate, recording, run
 
 from warp_eulsph.output import DamagedError, read_snapshot, record
 from warp_eulsph.output.checkpoint import decode
@@ -34,31 +32,20 @@ def test_thirty_kills_at_random_moments_lose_nothing(tmp_path):
     rng, kills, runs = random.Random(1), 0, 0
     while kills < KILLS:
         runs += 1
-        directory = tmp_path / f"run {runs}"
-        killed, confirmed = True, {}
-        while killed:
-            child = os.fork()
-            if child == 0:  # a copy of this process, with its kernels loaded
-                try:
-                    begin(directory, LONG)
-                except BaseException:
-                    os._exit(1)
-                os._exit(0)
-            time.sleep(rng.uniform(0.01, 0.25))
-            if kills < KILLS:
-                os.kill(child, signal.SIGKILL)
-            _, status = os.waitpid(child, 0)
-            killed = os.WIFSIGNALED(status)
-            assert killed or os.WEXITSTATUS(status) == 0, "the resumed run failed"
-            kills += killed
+        directory, confirmed = tmp_path / f"run {runs}", {}
+
+        def look(directory=directory, confirmed=confirmed):
             manifest = Manifest(directory)
             manifest.read()
             confirmed |= {entry.name: entry.sha256 for entry in manifest.entries}
             for path in (directory / "snap").glob("*.vtkhdf"):
                 assert read_snapshot(path).step == int(path.stem)  # whole, confirmed or not
+
+        kills += killed_until_done(lambda directory=directory: begin(directory, LONG), KILLS - kills, rng, look)
         assert contents(directory) == expected
-        final = {entry.name: entry.sha256 for entry in manifest.entries}
-        assert confirmed.items() <= final.items()
+        manifest = Manifest(directory)
+        manifest.read()
+        assert confirmed.items() <= {entry.name: entry.sha256 for entry in manifest.entries}.items()
 
 
 class Disk:

@@ -66,3 +66,23 @@ class Body:
                 f"got {values[tuple(first)]} at particle {first[0]} ({wrong.sum()} such values)"
             )
         return values.copy()
+
+
+def checked_bodies(bodies: list[Body]) -> list[Body]:
+    """The bodies, if one simulation can run them.
+
+    Raises:
+        ValueError: none, equal names, different dimensions, surfaces given for some only.
+    """
+    if not bodies:
+        raise ValueError("a simulation needs at least one body, got none")
+    names = [body.name for body in bodies]
+    if len(set(names)) < len(names):
+        raise ValueError(f"names of bodies must differ, got {names}; pass name=...")
+    given = [body.name for body in bodies if body.surface is not None]
+    if given and len(given) < len(bodies):
+        raise ValueError(f"surface must be given for all bodies or for none, got it for {given} of {names}")
+    dims = {body.name: body.x.shape[1] for body in bodies}
+    if len(set(dims.values())) > 1:
+        raise ValueError(f"bodies must have the same dimension, got {dims}")
+    return bodies

@@ -137,19 +137,18 @@ class SectionForce:
     """Force that the rest of the material exerts on some of the particles.
 
     Args:
-        indices: of the particles, (k,).
+        places: of the particles, (k,) int32.
     """
 
-    def __init__(self, space: Space, indices: np.ndarray, device: Any):
-        self.space, self.device = space, device
-        self._indices = wp.array(indices, dtype=wp.int32, device=device)
-        self._each, self._total = (wp.zeros(k, dtype=wp.vec3d, device=device) for k in (len(indices), 1))
-        self._sum = Sum(wp.vec3d, len(indices), device)
+    def __init__(self, space: Space, places: wp.array):
+        self.space, self.device, self._places = space, places.device, places
+        self._each, self._total = (wp.zeros(k, dtype=wp.vec3d, device=self.device) for k in (len(places), 1))
+        self._sum = Sum(wp.vec3d, len(places), self.device)
 
     def __call__(self, forces: Any) -> np.ndarray:
         """[N], (dim,), from the step's ``forces``: what acts between the particles themselves cancels in the sum."""
-        arguments = [self._indices, forces, self._each]
-        wp.launch(_make_section(self.space), len(self._indices), arguments, device=self.device)
+        arguments = [self._places, forces, self._each]
+        wp.launch(_make_section(self.space), len(self._places), arguments, device=self.device)
         self._sum(self._each, self._total)
         return self._total.numpy()[0][: self.space.dim].copy()
 

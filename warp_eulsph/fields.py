@@ -125,7 +125,7 @@ def clock_structure(space: Space) -> Any:
 
     ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``longest_dt`` [s] the
     longest of these, ``target`` [s] time that must be hit, ``rate`` [1/s] largest wave speed over spacing, or rate of
-    strain that asks for as short a step, ``bad`` index of the first unphysical particle; of a batch of recorded steps
+    strain that asks for as short a step, ``bad`` place of the first unphysical particle; of a batch of recorded steps
     ``running``, 0 when the rest is not to be taken, and ``taken``, steps so far.
     """
 

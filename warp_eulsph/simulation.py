@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .body import Body
+from .body import Body, checked_bodies
 from .boundaries import Assembly, Boundary
 from .diagnostics import Diagnostics
 from .execution import graphs
 from .fields import allocate
 from .memory import check_memory
+from .order import Order
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.flux import Flux, check_reference
 from .scheme.graphs import StepGraphs, recordable
@@ -21,6 +22,7 @@ from .scheme.lax_wendroff import LaxWendroff, is_corrected
 from .scheme.reference import Always, Configuration, ReferencePolicy
 from .scheme.time_step import DeviceClock, TimeStep
 from .scheme.verlet import Verlet
+from .sorting import Sorting
 from .space import Space
 from .weights import CubicSpline, Weight
 
@@ -44,6 +46,8 @@ class Simulation:
         periodic: lengths [m] of a periodic box with a corner at the origin, (dim,), 0 where open; None is open.
         dtype: ``wp.float64`` or ``wp.float32``.
         device: Warp device name; the default device if None.
+        sort: keep particles sorted in memory, so that steps do not slow down as they move; False is for comparisons.
+            Results come in the order of the bodies' particles either way; for arrays on the device see ``order``.
 
     Raises:
         ValueError: bodies of different dimension, equal names, coincident particles, particles whose neighbours do not
@@ -64,8 +68,9 @@ class Simulation:
         periodic: Sequence[float] | None = None,
         dtype: type = wp.float64,
         device: Any = None,
+        sort: bool = True,
     ):
-        self.bodies = _checked_bodies([bodies] if isinstance(bodies, Body) else list(bodies))
+        self.bodies = checked_bodies([bodies] if isinstance(bodies, Body) else list(bodies))
         X = np.concatenate([body.x for body in self.bodies])
         self.space = Space(X.shape[1], dtype, periodic is not None)
         self.device = wp.get_device(device)
@@ -80,7 +85,8 @@ class Simulation:
         ends = np.cumsum([0, *counts])
         self.ranges = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}
         self.particles = self._particles(dilation)
-        assembly = Assembly(self.space, self.device, X, self.particles, self.ranges)
+        self.order = Order(len(X), self.device)
+        assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
         materials = [(body.material, len(body.x)) for body in self.bodies]
         flux = Flux(self.space, materials, self.particles, self.device)
@@ -103,6 +109,7 @@ class Simulation:
             surface_given,
         )
         self._check_neighbourhoods(X)
+        self.sorting = Sorting(self.stepper, self.order, sort)
         self._graphs: StepGraphs | None = None
         self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
@@ -169,14 +176,16 @@ class Simulation:
         if self._graphs is None:
             self.stepper.step()
         else:
-            self._graphs.take(STEPS_BETWEEN_LOOKS if most is None else min(STEPS_BETWEEN_LOOKS, most))
+            limits = (STEPS_BETWEEN_LOOKS, most, self.sorting.steps_left(self.steps))
+            self._graphs.take(min(limit for limit in limits if limit is not None))
         self._raise_if_bad()
+        self.sorting.look_after(self.steps)
 
     # what a checkpoint holds
 
     def evolving(self) -> dict[str, wp.array]:
         """Every array that a step reads before it writes it, by name."""
-        return self.stepper.evolving()
+        return {"Order.ids": self.order.ids, **self.stepper.evolving()}
 
     @property
     def counters(self) -> dict[str, float]:
@@ -190,6 +199,7 @@ class Simulation:
             ValueError: names or shapes that are not those of this simulation; nothing was changed.
         """
         check_restorable(self, arrays, counters)
+        self.order.rearrange(arrays["Order.ids"])
         for name, array in self.evolving().items():
             array.assign(arrays[name])
         self.stepper.steps = int(counters["steps"])
@@ -243,22 +253,22 @@ class Simulation:
     @property
     def x(self) -> np.ndarray:
         """Positions [m], a copy of shape (n, dim)."""
-        return self.stepper.U.x.numpy().copy()
+        return self.order.by_number(self.stepper.U.x.numpy())
 
     @property
     def v(self) -> np.ndarray:
         """Velocities [m/s], a copy of shape (n, dim)."""
-        return self.stepper.U.v.numpy().copy()
+        return self.order.by_number(self.stepper.U.v.numpy())
 
     @property
     def F(self) -> np.ndarray:
         """Deformation gradients [-], a copy of shape (n, dim, dim)."""
-        return self.stepper.U.F.numpy().copy()
+        return self.order.by_number(self.stepper.U.F.numpy())
 
     @property
     def J(self) -> np.ndarray:
         """Volume ratios det F [-], (n,)."""
-        return self.diagnostics.jacobians(self.stepper.U)
+        return self.order.by_number(self.diagnostics.jacobians(self.stepper.U))
 
     def extrema(self) -> dict[str, float]:
         """Least and largest volume ratio det F [-] and largest speed [m/s], over all particles."""
@@ -285,8 +295,8 @@ class Simulation:
         """Force [N] that a velocity condition exerted on its particles, mean over the last step, (dim,)."""
         if boundary not in self.boundaries:
             raise ValueError(f"reaction: {boundary!r} is not one of the simulation's {len(self.boundaries)} boundaries")
-        indices = self.conditions[self.boundaries.index(boundary)].indices
-        return self.stepper.forces.reaction.numpy()[indices].sum(axis=0)
+        numbers = self.conditions[self.boundaries.index(boundary)].indices
+        return self.stepper.forces.reaction.numpy()[self.order.places[numbers]].sum(axis=0)
 
     # how it is built
 
@@ -338,15 +348,16 @@ class Simulation:
         return f"of body {name!r} at x = {np.array2string(x[particle], precision=6)} m"
 
     def _raise_if_bad(self) -> None:
-        particle, dt = self.clock.bad, self.clock.free_dt
-        if particle is not None:
+        place, dt = self.clock.bad, self.clock.free_dt
+        if place is not None:
+            particle = int(self.order.ids.numpy()[place])
             x, v, F = self.x[particle], self.v[particle], self.F[particle]
             if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
                 what = f"det F = {np.linalg.det(F):.4g}, must be positive"
             else:
                 what = f"non-finite values, v = {v}, F = {F.tolist()}"
         elif dt < STALLED * self.clock.longest_dt:
-            particle = int(self.stepper.flux.fields.speed.numpy().argmax())
+            particle = int(self.order.by_number(self.stepper.flux.fields.speed.numpy()).argmax())
             what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
         else:
             return
@@ -370,21 +381,6 @@ def check_restorable(simulation: Any, arrays: Mapping[str, np.ndarray], counters
             f"restore: arrays must have names and shapes of this simulation, {wrong[0] if wrong else 'counters'} "
             f"differs: {given.get(wrong[0]) if wrong else set(counters)}; build the simulation as it was"
         )
-
-
-def _checked_bodies(bodies: list[Body]) -> list[Body]:
-    if not bodies:
-        raise ValueError("a simulation needs at least one body, got none")
-    names = [body.name for body in bodies]
-    if len(set(names)) < len(names):
-        raise ValueError(f"names of bodies must differ, got {names}; pass name=...")
-    given = [body.name for body in bodies if body.surface is not None]
-    if given and len(given) < len(bodies):
-        raise ValueError(f"surface must be given for all bodies or for none, got it for {given} of {names}")
-    dims = {body.name: body.x.shape[1] for body in bodies}
-    if len(set(dims.values())) > 1:
-        raise ValueError(f"bodies must have the same dimension, got {dims}")
-    return bodies
 
 
 def _checked_box(periodic: Sequence[float] | None, dim: int) -> tuple[float, ...]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .order import Order
 from .schedule import SAME
 from .scheme.health import UnstableError, last_good
 from .scheme.reference import Configuration
@@ -44,6 +45,7 @@ class Transport:
         self.law, self.time_step, self.exact = law, float(time_step), exact
         self.space, self.device, self.particles = law.space, law.device, law.configuration.particles
         self.ranges: dict[str, range] = {}  # there are no bodies
+        self.order = Order(len(law.U), self.device)  # particles stay where they are, in memory too
         self.steps, self.dt = 0, 0.0
         self._most = GROWN * float(np.abs(law.start).max()) or np.inf
         self.output: Any = None

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..order import Order
 from ..space import Space
 
 #: A predicate of initial positions (n, dim) -> (n,) bool, a boolean mask (n,), or an array of indices.
@@ -24,6 +25,7 @@ class Assembly:
         X: initial positions [m], (n, dim).
         particles: struct ``Particles``.
         bodies: name of a body -> its range of particle indices.
+        order: gives arrays of places for indices, for particles move in memory (see ``Bound.sortable``).
     """
 
     space: Space
@@ -31,6 +33,7 @@ class Assembly:
     X: np.ndarray
     particles: Any
     bodies: dict[str, range]
+    order: Order
 
     def select(self, region: Region | None, body: str | None, who: str) -> np.ndarray:
         """Sorted indices of the region's particles, (k,) int32.
@@ -91,12 +94,15 @@ class Bound:
     """A condition at work; override what it does.
 
     Attributes:
-        indices: particles it acts on, (k,) int32.
+        indices: numbers of the particles it acts on, (k,) int32.
         recordable: whether ``impose`` and ``load`` launch kernels and nothing else, so that a graph can repeat them.
+        sortable: whether particles may be sorted in memory: it finds them by arrays of ``Assembly.order.places_of``,
+            what it holds for all of them comes from ``Assembly.order.carry``, the rest goes by ``indices``.
     """
 
     indices: np.ndarray
     recordable: bool = False
+    sortable: bool = False
 
     @property
     def loads(self) -> bool:

@@ -53,6 +53,7 @@ class BoundBodyForce(Bound):
     """Adds the weight of the particles."""
 
     reads_surface = False
+    sortable = True
 
     def __init__(self, condition: BodyForce, assembly: Assembly):
         who = type(condition).__name__
@@ -62,9 +63,9 @@ class BoundBodyForce(Bound):
         self.recordable = self.values.recordable
         self.X: wp.array | None = None
         if condition.material:
-            self.X = wp.array(assembly.X.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
+            self.X = assembly.order.carry(assembly.X, self.space.vec)
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x if self.X is None else self.X, clock, fraction)
-        arguments = [self.values.indices, values, self.mass, external]
+        arguments = [self.values.places, values, self.mass, external]
         wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)

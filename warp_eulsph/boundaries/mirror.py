@@ -155,17 +155,17 @@ class BoundMirrorGhosts(Bound):
     """Writes velocity, deformation gradient and position of the ghosts."""
 
     recordable = True
+    sortable = True
 
     def __init__(self, condition: MirrorGhosts, assembly: Assembly):
         self.space, self.device, self.image = assembly.space, assembly.device, condition.image
         first = assembly.bodies[condition.body][0] if condition.body in assembly.bodies else 0
         self.indices = assembly.select(first + condition.ghosts, condition.body, "MirrorGhosts")
         sources = (first + condition.sources).astype(np.int32)
-        self._sources = wp.array(sources, dtype=wp.int32, device=self.device)
-        self._ghosts = wp.array(self.indices, dtype=wp.int32, device=self.device)
-        self._X = wp.array(assembly.X.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
+        self._sources, self._ghosts = (assembly.order.places_of(numbers) for numbers in (sources, self.indices))
+        self._X = assembly.order.carry(assembly.X, self.space.vec)
         share = assembly.particles.share.numpy().copy()
-        share[self.indices] = 0.0
+        share[self._ghosts.numpy()] = 0.0
         assembly.particles.share.assign(share)
         self._plane = [self.space.vec(*condition.point), self.space.vec(*condition.normal)]
 

@@ -58,6 +58,8 @@ def _make_impose(space: Space) -> Any:
 class BoundMotion(Bound):
     """Writes the velocity that the displacement asks for."""
 
+    sortable = True
+
     def __init__(self, condition: Motion, assembly: Assembly):
         who = type(condition).__name__
         if not callable(condition.displacement):
@@ -67,7 +69,7 @@ class BoundMotion(Bound):
             )
         self.space, self.device = assembly.space, assembly.device
         self.indices = assembly.select(condition.region, condition.body, who)
-        self.X = wp.array(assembly.X.astype(self.space.numpy), dtype=self.space.vec, device=self.device)
+        self.X = assembly.order.carry(assembly.X, self.space.vec)
         self.before, self.after = (
             Value(assembly, self.indices, self.space.dim, condition.displacement, who) for _ in range(2)
         )
@@ -76,5 +78,5 @@ class BoundMotion(Bound):
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         before = self.before.at(self.X, clock, fraction - 0.5)
         after = self.after.at(self.X, clock, fraction + 0.5)
-        arguments = [self.before.indices, before, after, clock, state.v]
+        arguments = [self.before.places, before, after, clock, state.v]
         wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)

@@ -51,6 +51,8 @@ def _make_load(space: Space) -> Any:
 class BoundPressure(Bound):
     """Adds the pressure force."""
 
+    sortable = True
+
     def __init__(self, condition: Pressure, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device
@@ -60,5 +62,5 @@ class BoundPressure(Bound):
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
-        arguments = [self.values.indices, values, state, external]
+        arguments = [self.values.places, values, state, external]
         wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)

@@ -45,14 +45,15 @@ class BoundRoller(Bound):
     """Removes the velocity along the normal."""
 
     recordable = True
+    sortable = True
 
     def __init__(self, condition: Roller, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device
         self.normal = unit_vector(condition.normal, self.space.dim, who)
         self.indices = assembly.select(condition.region, condition.body, who)
-        self._indices = wp.array(self.indices, dtype=wp.int32, device=self.device)
+        self._places = assembly.order.places_of(self.indices)
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
-        arguments = [self._indices, self.space.vec(*self.normal), state.v]
+        arguments = [self._places, self.space.vec(*self.normal), state.v]
         wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)

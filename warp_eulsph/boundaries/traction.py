@@ -66,6 +66,7 @@ class BoundTraction(Bound):
     """
 
     reads_surface = False
+    sortable = True
 
     def __init__(self, condition: Traction, assembly: Assembly):
         who = type(condition).__name__
@@ -77,7 +78,7 @@ class BoundTraction(Bound):
         self.areas = wp.zeros(len(self.indices), dtype=self.space.real, device=self.device)
 
     def start(self, state: Any) -> None:
-        areas = state.surface.numpy()[self.indices] @ self.normal
+        areas = state.surface.numpy()[self.values.places.numpy()] @ self.normal
         self.areas.assign(areas.astype(self.space.numpy))
         if areas.min() > -0.01 * np.abs(areas).max():
             log.warning(
@@ -88,5 +89,5 @@ class BoundTraction(Bound):
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
-        arguments = [self.values.indices, values, self.areas, external]
+        arguments = [self.values.places, values, self.areas, external]
         wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)

@@ -34,9 +34,12 @@ def _make_evaluate(space: Space, components: int, function: Any) -> Any:
 class Value:
     """Rows of ``components`` reals for k particles, kept on the device.
 
+    Attributes:
+        places: of the particles in memory, (k,) int32 on the device.
+
     Args:
         assembly: the particles.
-        indices: those it is for, (k,).
+        indices: numbers of those it is for, (k,).
         components: reals in a row.
         given: a number or (components,) for all; (k, components), or (k,) when components is 1, one each; a
             ``wp.func`` (x, t) -> row, evaluated on the device; or a Python function (x (k, dim), t) -> any of these
@@ -46,8 +49,8 @@ class Value:
 
     def __init__(self, assembly: Assembly, indices: np.ndarray, components: int, given: Any, who: str):
         self.space, self.device, self.components, self.who = assembly.space, assembly.device, components, who
-        self.numpy_indices = indices
-        self.indices = wp.array(indices, dtype=wp.int32, device=assembly.device)
+        self.count = len(indices)
+        self.places = assembly.order.places_of(indices)
         self.rows = wp.zeros(len(indices), dtype=self.space.row(components), device=assembly.device)
         self.function = given if callable(given) else None
         self.on_device = isinstance(given, wp.Function)
@@ -65,14 +68,14 @@ class Value:
         """The rows at positions ``x`` [m] and time t + fraction · Δt, (k,)."""
         if self.on_device:
             kernel = _make_evaluate(self.space, self.components, self.function)
-            wp.launch(kernel, len(self.indices), [self.indices, x, clock, fraction, self.rows], device=self.device)
+            wp.launch(kernel, len(self.places), [self.places, x, clock, fraction, self.rows], device=self.device)
         elif self.function is not None:
             t = float(clock.t.numpy()[0]) + fraction * float(clock.dt.numpy()[0])
-            self.rows.assign(self._broadcast(self.function(x.numpy()[self.numpy_indices], t)))
+            self.rows.assign(self._broadcast(self.function(x.numpy()[self.places.numpy()], t)))
         return self.rows
 
     def _broadcast(self, given: Any) -> np.ndarray:
-        count = len(self.numpy_indices)
+        count = self.count
         values = np.asarray(given, dtype=self.space.numpy)
         if not np.isfinite(values).all():
             raise ValueError(f"{self.who}: values must be finite, got {given}")

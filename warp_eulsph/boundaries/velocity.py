@@ -51,6 +51,8 @@ def _make_impose(space: Space) -> Any:
 class BoundVelocity(Bound):
     """Writes the value into the velocity; ``who`` is the condition that errors name."""
 
+    sortable = True
+
     def __init__(self, condition: Velocity, assembly: Assembly, who: str):
         self.space, self.device = assembly.space, assembly.device
         self.indices = assembly.select(condition.region, condition.body, who)
@@ -63,7 +65,7 @@ class BoundVelocity(Bound):
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         values = self.values.at(state.x, clock, fraction)
-        arguments = [self.values.indices, values, self.axes, state.v]
+        arguments = [self.values.places, values, self.axes, state.v]
         wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)
 
 

@@ -85,6 +85,7 @@ class Case(Problem):
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
+    sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
     output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     probe: list[choice(Probe)] = Field([], description="what goes to tables of its own; boundary counts from 0")  # type: ignore
 
@@ -120,6 +121,7 @@ class Case(Problem):
             periodic=self.periodic,
             dtype=PRECISIONS[self.precision],
             device=self.device,
+            sort=self.sort,
         )
 
     def particular(self, simulation: Simulation) -> dict[str, Any]:

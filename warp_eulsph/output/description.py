@@ -55,6 +55,7 @@ def _solids(simulation: Simulation) -> dict[str, Any]:
         "reference": plain(stepper.policy),
         "time_step": plain(simulation.clock.option),
         "dilation": simulation.dilation,
+        "sort": simulation.sorting.on,
         "bodies": {body.name: plain(body) for body in simulation.bodies},
         "boundaries": {
             str(i): {**plain(boundary), "particles": plain(condition.indices)}

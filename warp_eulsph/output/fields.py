@@ -30,7 +30,7 @@ def _positions(simulation: Recorded) -> wp.array:
     return simulation.stepper.U.x if isinstance(simulation, Simulation) else simulation.configuration.fields.x
 
 
-#: What fields are made of: arrays of the device, to be copied, or made for the purpose on the host.
+#: What fields are made of: arrays of the device, by place, to be copied, or of the host, by number, made for it.
 SOURCES: dict[str, Callable[[Any], wp.array | np.ndarray]] = {
     "x": _positions,
     "v": lambda simulation: simulation.stepper.U.v,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-import warp as wp
 
 from ..boundaries import Boundary
 from ..diagnostics import BodySums, SectionForce
@@ -70,12 +69,12 @@ class PointProbe(Probe):
         if point.shape != (simulation.space.dim,) or not np.isfinite(point).all():
             raise ValueError(f"probe {self.name!r}: X must be ({simulation.space.dim},) finite numbers, got {self.X}")
         near, share = _shape_functions(simulation, body, point, self.name)
-        indices = wp.array(near + simulation.ranges[body.name].start, dtype=wp.int32, device=simulation.device)
+        places = simulation.order.places_of(near + simulation.ranges[body.name].start)
         U, space = simulation.stepper.U, simulation.space
         stress = stresses(space, len(near), simulation.device)
 
         def measure() -> dict[str, Any]:
-            x, v, F = (array[indices].contiguous() for array in (U.x, U.v, U.F))
+            x, v, F = (array[places].contiguous() for array in (U.x, U.v, U.F))
             body_stress(space, body.material, range(len(near)), F, stress)
             fields = {"x": x, "v": v, "F": F, "cauchy_stress": stress}
             return {name: np.tensordot(share, field.numpy().astype(float), 1) for name, field in fields.items()}
@@ -157,7 +156,8 @@ class SectionProbe(Probe):
                 f"probe {self.name!r}: the plane must cut body {body.name!r}, all of its particles lie on one side; "
                 f"they reach from {body.x.min(axis=0)} to {body.x.max(axis=0)} m"
             )
-        force = SectionForce(simulation.space, behind + simulation.ranges[body.name].start, simulation.device)
+        places = simulation.order.places_of(behind + simulation.ranges[body.name].start)
+        force = SectionForce(simulation.space, places)
         return lambda: {"force": force(simulation.stepper.forces)}
 
 

@@ -61,7 +61,8 @@ class Recording:
         """
         if self.region is None and self.body is None:
             return None
-        assembly = Assembly(simulation.space, simulation.device, simulation.X, simulation.particles, simulation.ranges)
+        space, device, particles = simulation.space, simulation.device, simulation.particles
+        assembly = Assembly(space, device, simulation.X, particles, simulation.ranges, simulation.order)
         return assembly.select(self.region, self.body, "Recording")
 
     @property

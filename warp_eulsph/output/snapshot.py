@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from ..fields import STATE
 from .atomic import replace_file
@@ -89,10 +90,14 @@ def collect(
 
     ``copies`` makes the copies, which may be on their way then; without it all is there.
     """
-    fields, chosen = chosen_fields(names, simulation), slice(None) if particles is None else particles
+    fields, places = chosen_fields(names, simulation), simulation.order.places
+    numbers = np.arange(len(places)) if particles is None else particles
     needed = dict.fromkeys(["x", *(source for field in fields.values() for source in field.sources)])
     taken = Copies(simulation.device) if copies is None else copies
-    sources = {name: taken.take(SOURCES[name](simulation), chosen) for name in needed}
+    sources = {}
+    for name in needed:
+        source = SOURCES[name](simulation)
+        sources[name] = taken.take(source, places[numbers] if isinstance(source, wp.array) else numbers)
     frame = Frame(simulation.t, simulation.steps, simulation.space.dim, fields, sources)
     if copies is None:
         frame.wait()

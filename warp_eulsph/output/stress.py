@@ -68,7 +68,7 @@ def stresses(space: Space, n: int, device: Any) -> wp.array:
 
 
 def stress_array(simulation: Simulation) -> wp.array:
-    """σ = P(F) Fᵀ / J [Pa] of the present state, (n,) of 3 × 3: M1 with the present configuration as reference.
+    """σ = P(F) Fᵀ / J [Pa] of the present state by place, (n,) of 3 × 3: M1, the reference being the present.
 
     In 2-D and 1-D the 3-D law acts on F with the missing stretches equal to one, so σ33 of plane strain is there too.
     """
@@ -80,5 +80,5 @@ def stress_array(simulation: Simulation) -> wp.array:
 
 
 def cauchy_stress(simulation: Simulation) -> np.ndarray:
-    """``stress_array`` on the host, (n, 3, 3)."""
-    return stress_array(simulation).numpy().copy()
+    """``stress_array`` on the host, by number, (n, 3, 3)."""
+    return simulation.order.by_number(stress_array(simulation).numpy())

@@ -19,7 +19,7 @@ class UnstableError(RuntimeError):
     """A run met det F ≤ 0 or a non-finite value; the message names particle, position, time and remedies.
 
     Attributes:
-        particle: index of the first bad particle.
+        particle: number of a bad particle, the first of them in memory.
         time: time [s] at the end of the last good step.
         step: number of steps taken, the bad one included.
     """

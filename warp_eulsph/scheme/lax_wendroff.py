@@ -297,6 +297,8 @@ class LaxWendroffStepper:
         listed = [arrays(self.U, "State"), arrays(self.particles, "Particles"), {"reaction": self.forces.reaction}]
         parts = [self.configuration, self.clock, self.flux, self.stabiliser, self.ledger]
         listed += [part.evolving() for part in parts]
+        if self.shifter is not None:
+            listed.append(self.shifter.evolving())
         for i, condition in enumerate(self.conditions):
             listed.append({f"Condition.{i}.{name}": array for name, array in condition.evolving().items()})
         return {name: array for part in listed for name, array in part.items()}

@@ -12,6 +12,7 @@ import warp as wp
 
 from ..boundaries.base import Assembly, Region
 from ..fields import allocate, structure
+from ..order import Order
 from ..space import Space
 from ..weights import CubicSpline, Weight
 from .reference import Configuration
@@ -207,7 +208,7 @@ class ConservationLaw:
         self._grad_flux = wp.zeros(n, dtype=space.mat, device=self.device)
         chosen = np.zeros(0, dtype=np.int32)
         if held is not None:
-            chosen = Assembly(space, self.device, x, particles, {}).select(held, None, "held")
+            chosen = Assembly(space, self.device, x, particles, {}, Order(n, self.device)).select(held, None, "held")
         self.start, self.held = np.array(U, dtype=float), chosen
         self._held = wp.array(chosen, dtype=wp.int32, device=self.device)
         self._held_values = wp.array(np.reshape(U, (n, 1))[chosen], dtype=row, device=self.device)

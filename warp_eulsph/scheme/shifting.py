@@ -149,6 +149,10 @@ class Shifter:
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
         self.projection = Projection(space, particles, flux.bodies, device)
 
+    def evolving(self) -> dict[str, wp.array]:
+        """Which particles may be shifted: no step changes it, but particles change places."""
+        return {"Shifter.free": self.free}
+
     def apply(self, reference: Any, psi: wp.array, U: Any, grad_v: wp.array, grad_F: wp.array, clock: Any) -> None:
         """Shift the particles of ``U``, whose gradients in ``reference`` are given; ψ [m] are its potentials (M13)."""
         option, n = self.option, len(psi)

@@ -156,7 +156,7 @@ class DeviceClock:
 
     @property
     def bad(self) -> int | None:
-        """Index of the first unphysical particle, None while all are well; reads the device."""
+        """Place of the first unphysical particle, None while all are well; reads the device."""
         first = int(self.fields.bad.numpy()[0])
         return None if first == WELL else first
 

@@ -106,6 +106,7 @@ class Step:
             weight=point.weight,
             dilation=point.dilation,
             periodic=size if point.periodic else None,
+            sort=False,  # its arrays are written from outside
         )
         self.moving = not point.reference.fixed
         self._strain()

@@ -47,7 +47,7 @@ def twist(x: np.ndarray) -> np.ndarray:
 def twist_energy_error(simulation: Simulation) -> float:
     """Energy of the strains that M4 sees in the twist, over that of the exact ones at the same particles, less 1."""
     stepper, x = simulation.stepper, simulation.bodies[0].x
-    stepper.U.v.assign(twist(x))
+    stepper.U.v.assign(simulation.order.by_place(twist(x)))
     stepper._velocity_gradient(stepper.U)
     stepper.U.F.assign(np.eye(3) + stepper.grad_v.numpy())
     rate = AMPLITUDE * np.pi / (2.0 * HEIGHT) * np.cos(np.pi * x[:, 1] / (2.0 * HEIGHT))
