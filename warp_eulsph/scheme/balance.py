@@ -46,7 +46,7 @@ OPENED = 1.0
 
 @dataclass(frozen=True)
 class Balance:
-    """Pair vectors of M4 and M5 from x̂ = x − ½(1 + λT)ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
+    """Pair vectors of M4 and M5 from x̂ = x − ½ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
 
     M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
     it, whatever x̂ is, while the force that a uniform stress exerts on an irregular arrangement loses its short waves,
@@ -138,7 +138,7 @@ def _make_relax(space: Space, simd: bool, start: bool) -> Any:
 
 @functools.cache
 def _make_shift(space: Space) -> Any:
-    """Kernel: x̂ = x − ½(ψ + λ(T₊ψ + T₋χ)), |x̂ − x| ≤ ``bound``, λ = lean m²/(m² + LEANING²) q²/(q² + LOADED²) (M13).
+    """Kernel: x̂ = x − ½(ψ + λ(T₊ψ + T₋χ)), λ = lean m²/(m² + LEANING²) q²/(q² + LOADED²) (M13).
 
     m = |½ψ| and the bound are in spacings, q is |Q| over the modulus of pressure waves; T± = ½t±(Q̂² ± Q̂), Q̂ = Q/|Q|,
     are t± along a single tension and a single compression; χ, not longer than ψ, is ψ of short waves.
