@@ -36,7 +36,7 @@ LOADED = 0.01
 ALONG_TENSION, ALONG_COMPRESSION = 1.5, -0.9
 
 # Waves whose eigenvalue is less than this part of the saw-tooth's lean less along compression: pairs are short waves,
-# while long ones are what material that flows round an edge carries along. At a half strong shocks are off by 1.1 %
+# while long ones are what material that flows round an edge carries along. At a half strong shocks are off by 1.3 %
 # instead of 1.0; at a quarter the punch's reaction is 3.4 % too low instead of 2.1.
 SHORT = 1.0 / 3.0
 
