@@ -25,7 +25,7 @@ class LateCopies(copies.Copies):
         self.taken, self.arrived, self.released = 0, [], 0
         made.append(self)
 
-    def take(self, array, chosen=copies.ALL):
+    def take(self, array, chosen=None):
         if isinstance(array, np.ndarray):
             return super().take(array, chosen)
         present, values = np.array(array.numpy()), np.full_like(array.numpy(), -1)

@@ -50,11 +50,11 @@ class Order:
 
     def by_number(self, stored: np.ndarray) -> np.ndarray:
         """What arrays on the device hold, (n, …), in the order of the numbers; a copy."""
-        return stored[self.places]
+        return stored.take(self.places, axis=0)  # which copies rows whole, several times as fast as stored[places]
 
     def by_place(self, given: np.ndarray) -> np.ndarray:
         """Values in the order of the numbers, (n, …), as arrays on the device hold them; a copy."""
-        return given[self.ids.numpy()]
+        return given.take(self.ids.numpy(), axis=0)
 
     def places_of(self, numbers: np.ndarray) -> wp.array:
         """Places of particles, (k,) int32 on the device, kept right as long as the array lives."""

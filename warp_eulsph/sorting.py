@@ -11,6 +11,7 @@ import warp as wp
 from .fields import structure
 from .order import Order, spatial_order
 from .scheme.lax_wendroff import LaxWendroffStepper
+from .scheme.reference import reference_spacing
 from .space import Space, difference
 
 log = logging.getLogger(__name__)
@@ -30,7 +31,11 @@ SHORT_ROWS = 0.25
 def _make_count_parted(space: Space) -> Any:
     """Kernel: how many particles are far from the one before them, if it is of the same body."""
     real, vec, separation = space.real, space.vec, difference(space)
-    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+    Particles, Reference, spacing_of = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        reference_spacing(space),
+    )
 
     @wp.kernel(module="unique", enable_backward=False)
     def count_parted(
@@ -43,7 +48,7 @@ def _make_count_parted(space: Space) -> Any:
         i = wp.tid()
         a = places[i]
         b = places[i + 1]
-        spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
+        spacing = spacing_of(a, particles, reference)
         far = wp.length(separation(reference.x[b], reference.x[a], box)) > real(APART) * spacing
         if far and particles.body[a] == particles.body[b]:
             wp.atomic_add(count, 0, 1)

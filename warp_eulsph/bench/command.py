@@ -22,7 +22,7 @@ from .roof import least_seconds
 WARM_UP, ROUNDS = 3, 5
 SECONDS_PER_ROUND = 0.5
 # Of a round: in 1-D the positions of 20 000 particles in float32 are known to a thousandth of a spacing only, and where
-# the reference moves that is the end of them after a thousand steps.
+# the reference moves that feeds energy over thousands of steps (docs/method.md, §9).
 MOST_STEPS = 100
 
 

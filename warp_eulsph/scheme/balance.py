@@ -13,7 +13,7 @@ from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
 from .dissipation import UpwindForces
 from .flux import Flux
-from .reference import Configuration, ReferencePolicy
+from .reference import Configuration, ReferencePolicy, reference_spacing
 
 # Eigenvalue of the saw-tooth, the wave that pairs particles up, of the graph Laplacian over its diagonal, by dimension,
 # in lattices at dilation 1.3.
@@ -144,8 +144,9 @@ def _make_shift(space: Space) -> Any:
     are t± along a single tension and a single compression; χ, not longer than ψ, is ψ of short waves.
     """
     real, vec, mat = space.real, space.vec, space.mat
-    longest = 0.5 / (SHORT * SAW_TOOTH[space.dim])
+    short_wave = 0.5 / (SHORT * SAW_TOOTH[space.dim])
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
+    spacing_of = reference_spacing(space)
 
     @wp.func
     def within(v: vec, most: real) -> vec:
@@ -166,7 +167,7 @@ def _make_shift(space: Space) -> Any:
         lean: real,
     ):
         a = first + wp.tid()
-        spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
+        spacing = spacing_of(a, particles, reference)
         away = psi[a] * real(0.5)
         disorder = wp.dot(away, away) / (spacing * spacing)
         share = lean * disorder / (disorder + real(LEANING * LEANING))
@@ -174,7 +175,7 @@ def _make_shift(space: Space) -> Any:
         load = wp.ddot(Q, Q)
         if load > real(0.0) and disorder > real(0.0):
             share *= load / (load + modulus * modulus)
-            short = K[a] @ defect[a] * (real(longest) / (reference.V[a] * reference.diagonal[a]))
+            short = K[a] @ defect[a] * (real(short_wave) / (reference.V[a] * reference.diagonal[a]))
             short = within(short, wp.length(away))
             Q_hat = Q / wp.sqrt(load)
             pulled, pressed = Q_hat @ away, Q_hat @ short

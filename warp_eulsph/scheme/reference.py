@@ -141,17 +141,28 @@ LOPSIDED = 4.0
 
 
 @functools.cache
+def reference_spacing(space: Space) -> Any:
+    """``wp.func`` spacing of particle a in the reference [m], which follows its smoothing length."""
+    real, Particles, Reference = space.real, structure(space, "Particles"), structure(space, "Reference")
+
+    @wp.func
+    def reference_spacing(a: int, particles: Particles, reference: Reference) -> real:
+        return particles.spacing[a] * reference.h[a] / particles.h[a]
+
+    return reference_spacing
+
+
+@functools.cache
 def resolution(space: Space) -> Any:
     """``wp.func`` of particle a what the Courant number counts by [1/m]: 1/spacing, more where L is large."""
-    real, bounds = space.real, symmetric_bounds(space)
+    real, bounds, spacing_of = space.real, symmetric_bounds(space), reference_spacing(space)
     Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
 
     @wp.func
     def resolution(a: int, particles: Particles, reference: Reference) -> real:
         L = reference.L[a]
         lopsided = bounds((L + wp.transpose(L)) * real(0.5))[1] / real(LOPSIDED)
-        spacing = particles.spacing[a] * reference.h[a] / particles.h[a]
-        return wp.sqrt(wp.max(lopsided, real(1.0))) / spacing
+        return wp.sqrt(wp.max(lopsided, real(1.0))) / spacing_of(a, particles, reference)
 
     return resolution
 
