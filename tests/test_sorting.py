@@ -390,15 +390,6 @@ def test_stirred_liquids_are_sorted_as_they_part(monkeypatch):
     np.testing.assert_allclose(cubes[True].x, cubes[False].x, atol=1e-6)
 
 
-def test_arrays_of_places_are_dropped_with_those_who_use_them():
-    simulation = two_blocks()
-    before = len(simulation.order._kept)
-    for _ in range(3):
-        PointProbe(name="point", X=(0.5, 0.5)).bind(simulation)
-    shuffle(simulation)
-    assert len(simulation.order._kept) == before
-
-
 def test_every_array_lies_where_it_was():
     """Recorded launches and graphs hold pointers."""
     simulation = two_blocks()
@@ -406,33 +397,3 @@ def test_every_array_lies_where_it_was():
     before = {path: array.ptr for path, array in reachable(simulation)[0].items()}
     shuffle(simulation)
     assert len(before) > 50 and {path: array.ptr for path, array in reachable(simulation)[0].items()} == before
-
-
-def distance_in_memory(x, spacing, order):
-    """Mean distance in memory of particles that are near each other, as a share of all."""
-    near = np.linalg.norm(x[order][:, None] - x[order][None], axis=-1) < 2.6 * spacing
-    first, second = np.nonzero(near)
-    return np.abs(first - second).mean() / len(x)
-
-
-@pytest.mark.parametrize("dim", [1, 2, 3])
-def test_spatial_order_brings_neighbours_together(dim):
-    x, _ = cloud(dim, 9, jitter=0.2)
-    mixed = np.random.default_rng(0).permutation(len(x))
-    order = es.spatial_order(x[mixed], 1 / 9)
-    assert np.array_equal(np.sort(order), np.arange(len(x)))
-    assert distance_in_memory(x, 1 / 9, mixed) > 0.25
-    assert distance_in_memory(x, 1 / 9, mixed[order]) < 1.1 * distance_in_memory(x, 1 / 9, np.arange(len(x)))
-
-
-def test_spatial_order_keeps_rows_of_a_lattice_together():
-    x, _ = cloud(3, 6, jitter=0.0)
-    rows = x[es.spatial_order(x, 1 / 6)].reshape(9, 24, 3)
-    np.testing.assert_allclose(np.ptp(rows, axis=1), np.tile([1 / 6, 1 / 6, 5 / 6], (9, 1)))
-
-
-def test_bad_input_is_named():
-    with pytest.raises(ValueError, match=r"x must be finite and have shape \(n, dim\), got \(3,\)"):
-        es.spatial_order(np.zeros(3), 1.0)
-    with pytest.raises(ValueError, match="spacing must be positive and finite, got 0"):
-        es.spatial_order(np.zeros((3, 2)), 0.0)
