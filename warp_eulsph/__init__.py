@@ -37,6 +37,7 @@ from .materials import (
 )
 from .operators.values import Linear, Shepard
 from .order import spatial_order
+from .scheme.arrangement import Arrangement, Convected, Current
 from .scheme.balance import Balance
 from .scheme.dissipation import Upwind
 from .scheme.health import UnstableError
@@ -49,6 +50,7 @@ from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
 from .scheme.shifting import Shifting
 from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.surface_vectors import SurfaceVectors
+from .scheme.tie import Tie
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
 from .simulation import Body, Simulation
@@ -58,12 +60,15 @@ from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, Wendland
 __all__ = [
     "Always",
     "Antisymmetry",
+    "Arrangement",
     "Balance",
     "Bar",
     "Body",
     "BodyForce",
     "Boundary",
+    "Convected",
     "CubicSpline",
+    "Current",
     "DimensionlessSensor",
     "Every",
     "Fixed",
@@ -99,6 +104,7 @@ __all__ = [
     "Space",
     "SurfaceVectors",
     "TaitLiquid",
+    "Tie",
     "TimeStep",
     "Traction",
     "UnstableError",

@@ -97,7 +97,7 @@ def _make_section(space: Space) -> Any:
     def section(indices: wp.array(dtype=wp.int32), forces: Forces, out: wp.array(dtype=wp.vec3d)):
         k = wp.tid()
         a = indices[k]
-        total = forces.internal[a] + forces.correction[a] + forces.dissipation[a]
+        total = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a]
         force = wp.vec3d()
         for i in range(wp.static(dim)):
             force[i] = wp.float64(total[i])

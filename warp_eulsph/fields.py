@@ -54,6 +54,7 @@ REFERENCE = {
 FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
     "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
+    "tie": Field("mat", "Pa", "share of Q that ties F to the positions (M16); empty where nothing is tied"),
     "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
     "impedance": Field("real", "kg/(m^2 s)", "density times pressure-wave speed, both measured in the reference (M9)"),
     "shear_impedance": Field(
@@ -64,6 +65,7 @@ FORCES = {
     "internal": Field("vec", "N", "internal force -T of the dual divergence (M5)"),
     "correction": Field("vec", "N", "force of the closed pair areas (M10, M11, M12)"),
     "dissipation": Field("vec", "N", "upwind dissipation (M9)"),
+    "tie": Field("vec", "N", "force that ties positions to F (M16)"),
     "external": Field("vec", "N", "body forces, tractions, pressures"),
     "free_v": Field("vec", "m/s", "velocity at the end of the step before the conditions were imposed"),
     "reaction": Field("vec", "N", "force that the imposed velocities took, mean over the step"),

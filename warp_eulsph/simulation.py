@@ -14,12 +14,13 @@ from .fields import allocate
 from .memory import check_memory
 from .order import Order
 from .schedule import AtTimes, EveryTime, targets
+from .scheme.arrangement import Arrangement, Convected
 from .scheme.flux import Flux, check_reference
 from .scheme.graphs import StepGraphs, recordable
 from .scheme.health import UnstableError, last_good
 from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff, is_corrected
-from .scheme.reference import Always, Configuration, ReferencePolicy
+from .scheme.reference import Always, Configuration, Never, ReferencePolicy
 from .scheme.time_step import DeviceClock, TimeStep
 from .scheme.verlet import Verlet
 from .sorting import Sorting
@@ -39,6 +40,7 @@ class Simulation:
         bodies: one or several ``Body``; particles of different bodies are never neighbours.
         boundaries: conditions, imposed in this order.
         reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian.
+        arrangement: which bodies a refresh reads anew from their positions: Convected() those that flow, Current() all.
         scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax.
         time_step: TimeStep options.
         weight: SPH weight.
@@ -61,6 +63,7 @@ class Simulation:
         *,
         boundaries: Sequence[Boundary] = (),
         reference: ReferencePolicy = Always(),
+        arrangement: Arrangement = Convected(),
         scheme: Verlet | LaxWendroff | Lax = Verlet(),
         time_step: TimeStep = TimeStep(),
         weight: Weight = CubicSpline(),
@@ -76,6 +79,9 @@ class Simulation:
         self.device = wp.get_device(device)
         self.boundaries = tuple(boundaries)
         check_reference([body.material for body in self.bodies], reference)
+        moving = [not reference.fixed and arrangement.moves(body.material) for body in self.bodies]
+        if not any(moving):
+            reference = Never()
         if not (np.isfinite(dilation) and dilation > 0.0):
             raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
         self.dilation = dilation
@@ -93,7 +99,13 @@ class Simulation:
         surface_given = self.bodies[0].surface is not None
         corrected = is_corrected(scheme, reference, surface_given)
         configuration = Configuration(
-            self.space, weight, self.particles, box, self.device, fixed=reference.fixed, corrected=corrected
+            self.space,
+            weight,
+            self.particles,
+            box,
+            self.device,
+            moving=[range(ends[i], ends[i + 1]) for i, moves in enumerate(moving) if moves],
+            corrected=corrected,
         )
         self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
         U = self._state(X)
@@ -107,6 +119,7 @@ class Simulation:
             self.clock,
             self.conditions,
             surface_given,
+            moving,
         )
         self._check_neighbourhoods(X)
         self.sorting = Sorting(self.stepper, self.order, sort)
@@ -275,12 +288,14 @@ class Simulation:
         return dict(zip(("least J", "largest J", "speed"), self.diagnostics.extrema(self.stepper.U), strict=True))
 
     def energy(self) -> dict[str, float]:
-        """Energies [J]: kinetic, stored, total, what each mechanism added since the start, and the residual."""
+        """Energies [J]: kinetic, stored in strain, in the tie (M16), total, what each mechanism added, the residual."""
         U, ledger = self.stepper.U, self.stepper.ledger
         kinetic, stored = ledger.kinetic(U), ledger.stored(U)
         accounts = ledger.accounts()
-        residual = kinetic + stored - ledger.start - sum(accounts.values())
-        return {"kinetic": kinetic, "stored": stored, "total": kinetic + stored, **accounts, "residual": residual}
+        tied = -accounts.pop("tie")
+        total = kinetic + stored + tied
+        residual = total - ledger.start - sum(accounts.values())
+        return {"kinetic": kinetic, "stored": stored, "tied": tied, "total": total, **accounts, "residual": residual}
 
     def momentum(self) -> np.ndarray:
         """Linear momentum [kg m/s], (dim,)."""

@@ -77,8 +77,8 @@ class Material(ABC):
 
     density: float
 
-    #: The carried F is not the total deformation gradient, so the reference must be refreshed every step.
-    needs_moving_reference: ClassVar[bool] = False
+    #: The carried F is not the whole deformation gradient: neighbours change for good, and so must the reference.
+    flows: ClassVar[bool] = False
     #: P is linear in F − I: for small strains and rotations only, because a rotation then causes stress.
     linear: ClassVar[bool] = False
 

@@ -24,7 +24,7 @@ class TaitLiquid(Material):
 
     sound_speed: float
     gamma: float = 7.0
-    needs_moving_reference: ClassVar[bool] = True
+    flows: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

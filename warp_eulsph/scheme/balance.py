@@ -76,9 +76,11 @@ class Balance:
         if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 1.0):
             raise ValueError(f"lean must be in [0, 1], got {self.lean}; 1 is the tested value")
 
-    def build(self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, device: Any) -> "BalancedPairs":
+    def build(
+        self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, moving: list[range], device: Any
+    ) -> "BalancedPairs":
         """Allocate."""
-        return BalancedPairs(self, space, particles, flux, policy, device)
+        return BalancedPairs(self, space, particles, flux, policy, moving, device)
 
 
 @functools.cache
@@ -191,17 +193,19 @@ def _make_shift(space: Space) -> Any:
 def _make_correct(space: Space, simd: bool) -> Any:
     """Kernel: L_a = (Σ_b V_b g_ab ξ ⊗ ξ̂)⁻¹ with ξ̂ between balanced positions: M4 stays exact for linear fields (M13).
 
-    Where the sum has lost half of det K, in neighbourhoods that are nearly flat, L_a stays that of M3.
+    Where the sum has lost half of det K, or K a direction, in neighbourhoods nearly flat, L_a stays that of M3.
     """
     real, mat = space.real, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     sum_of, invert, determinant = outer_sum(space, simd, of_positions=True), inverse(space), det(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correct_balanced(first: int, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
+    def correct_balanced(
+        first: int, reference: Reference, near: Neighbours, K: wp.array(dtype=mat), poor: wp.array(dtype=wp.int32)
+    ):
         a = first + wp.tid()
         sums = sum_of(a, near, reference.x, reference.balanced)
-        if determinant(sums) > real(0.5) * determinant(K[a]):
+        if poor[a] == 0 and determinant(sums) > real(0.5) * determinant(K[a]):
             reference.L[a] = invert(sums)
 
     return correct_balanced
@@ -210,10 +214,20 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    def __init__(self, option: Balance, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, device: Any):
+    def __init__(
+        self,
+        option: Balance,
+        space: Space,
+        particles: Any,
+        flux: Flux,
+        policy: ReferencePolicy,
+        moving: list[range],
+        device: Any,
+    ):
         super().__init__(space, device)
         self.flux = flux.fields  # of the last step when a refresh asks for it
         self.option, self.particles, n = option, particles, len(particles.mass)
+        self._balanced, self._moving = [range(n)], moving  # all at the start, then those that move
         # A push goes on until the next refresh looks at it again: the longer a reference lasts, the less it may push.
         self.lean = option.lean / math.sqrt(policy.lasts)
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
@@ -227,15 +241,20 @@ class BalancedPairs(UpwindForces):
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Balance the new reference."""
-        reference, near, n, simd = configuration.fields, configuration.near, len(self.psi), configuration.simd
+        reference, near, simd = configuration.fields, configuration.near, configuration.simd
         configuration.defect(state.surface, self.defect)
-        self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface])
+        self._over(_make_renew(self.space), [reference, self.defect, state.surface])
         for sweep in range(self.option.sweeps):
             old, new = self.psi, self._other
             if (self.option.sweeps - sweep) % 2:  # the last sweep writes ψ, the others take turns
                 old, new = new, old
             arguments = [reference, near, configuration.K, self.defect, old, new]
-            self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
+            self._over(_make_relax(self.space, simd, sweep == 0), arguments)
         arguments = [self.particles, reference, configuration.K, self.defect, self.psi, self.flux]
-        self._launch(_make_shift(self.space), n, [*arguments, self.option.bound, self.lean])
-        self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K])
+        self._over(_make_shift(self.space), [*arguments, self.option.bound, self.lean])
+        self._over(_make_correct(self.space, simd), [reference, near, configuration.K, configuration.poor])
+        self._balanced = self._moving
+
+    def _over(self, kernel: Any, arguments: list[Any]) -> None:
+        for body in self._balanced:
+            self._launch(kernel, len(body), arguments, body.start)

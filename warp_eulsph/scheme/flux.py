@@ -103,6 +103,18 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
 
 
 @functools.cache
+def _make_modulus(space: Space, law: Law) -> Any:
+    """Kernel of one thread: the modulus of pressure waves at F = I."""
+    real, dim, Constants, moduli = space.real, space.dim, law.Constants, law.wave_moduli
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def modulus(c: Constants, out: wp.array(dtype=real)):
+        out[0] = moduli(wp.identity(n=wp.static(dim), dtype=real), c)[0]
+
+    return modulus
+
+
+@functools.cache
 def _make_energy(space: Space, law: Law) -> Any:
     mat = space.mat
     Particles, Constants, density = structure(space, "Particles"), law.Constants, law.energy
@@ -153,10 +165,10 @@ def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> N
     """Raise unless the reference moves every step where a material needs that.
 
     Raises:
-        ValueError: a material with ``needs_moving_reference`` and a policy other than Always().
+        ValueError: a material that flows and a policy other than Always().
     """
     for material in materials:
-        if material.needs_moving_reference and policy not in (Always(), Every(1)):
+        if material.flows and policy not in (Always(), Every(1)):
             raise ValueError(
                 f"reference must be Always() for {type(material).__name__}, whose F is not counted from the initial "
                 f"configuration, got {policy}"
@@ -187,7 +199,7 @@ class Flux:
             history = wp.zeros(count, dtype=space.row(law.history), device=device) if law.history else None
             self.parts.append(_Part(first, count, law, constants, history))
             first += count
-        self.fields = allocate(space, "Flux", first, device, empty=("Pi",))
+        self.fields = allocate(space, "Flux", first, device, empty=("Pi", "tie"))
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.histories = [part.history for part in self.parts]
 
@@ -199,6 +211,15 @@ class Flux:
         """Have ``compute`` write Π too, for forces that take it from the array (M5)."""
         if not len(self.fields.Pi):
             self.fields.Pi = wp.zeros_like(self.fields.Q)
+
+    def moduli(self) -> list[float]:
+        """Modulus of pressure waves at F = I [Pa] of each body; reads the device."""
+        found = []
+        for part in self.parts:
+            out = wp.zeros(1, dtype=self.space.real, device=self.device)
+            wp.launch(_make_modulus(self.space, part.law), 1, [part.constants, out], device=self.device)
+            found.append(float(out.numpy()[0]))
+        return found
 
     def compute(self, F: wp.array, configuration: Configuration) -> None:
         """Q of the deformation gradients ``F`` (M1), and Π = Q Lᵀ (M5) if it is kept."""

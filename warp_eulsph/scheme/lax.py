@@ -31,6 +31,7 @@ class Lax:
     correction: Any = Balance()
     limiter: ClassVar[None] = None
     shifting: ClassVar[None] = None
+    tie: ClassVar[None] = None
     cfl: ClassVar[float] = 0.4
 
     def build(self, *parts: Any) -> "LaxStepper":

@@ -23,6 +23,7 @@ from .sensor import SensorField
 from .shifting import Shifter, Shifting
 from .smoothing import Smoothing
 from .stabiliser import Stabiliser
+from .tie import Tie, TiedPairs
 from .time_step import DeviceClock
 
 
@@ -39,6 +40,7 @@ class LaxWendroff:
             zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
         shifting: what keeps the arrangement even in a moving reference (M15), with Balance() only; None shifts nothing.
+        tie: what ties positions to F where the arrangement does not move (M16); None is the paper's.
     """
 
     smoothing: Smoothing | None = None
@@ -46,6 +48,7 @@ class LaxWendroff:
     correction: Any = Balance()
     limiter: FluxCorrectedTransport | None = None
     shifting: Shifting | None = None
+    tie: Tie | None = None
     #: Tested Courant number; the limit is 0.5 in bounded 3-D bodies.
     cfl: ClassVar[float] = 0.4
 
@@ -101,7 +104,7 @@ def _make_predict(space: Space, fixed: bool, surfaces: bool) -> Any:
     ):
         a = first + wp.tid()
         tau = real(fraction * clock.dt[0])
-        force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
+        force = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a] + forces.external[a]
         half.v[a] = half.v[a] + force * (tau / particles.mass[a])
         dF = grad_v[a] * tau
         if wp.static(not fixed):
@@ -123,7 +126,7 @@ def _make_kick(space: Space) -> Any:
     @wp.kernel(module="unique", enable_backward=False)
     def kick(first: int, particles: Particles, forces: Forces, clock: Clock, v: wp.array(dtype=vec)):
         a = first + wp.tid()
-        force = forces.internal[a] + forces.correction[a] + forces.dissipation[a] + forces.external[a]
+        force = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a] + forces.external[a]
         v[a] = v[a] + force * (real(clock.dt[0]) / particles.mass[a])
 
     return kick
@@ -182,7 +185,9 @@ class LaxWendroffStepper:
         clock: DeviceClock,
         conditions: Sequence[Bound],
         surface_given: bool,
+        moving: list[bool],
     ):
+        moving_bodies = [body for body, moves in zip(flux.bodies, moving, strict=True) if moves]
         n, device = len(U.x), flux.device
         self.options, self.space, self.device, self.n = options, space, device, n
         self._launch = Launcher(device)
@@ -193,22 +198,31 @@ class LaxWendroffStepper:
             self.half.surface = U.surface
         self.particles, self.flux, self.configuration = particles, flux, configuration
         self.policy, self.clock, self.conditions = policy, clock, conditions
-        self.forces = allocate(space, "Forces", n, device, empty=("correction", "external"))
+        self.forces = allocate(space, "Forces", n, device, empty=("correction", "tie", "external"))
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         self.shifter: Shifter | None = None
         if options.shifting is not None and not policy.fixed:
-            self.shifter = options.shifting.build(space, particles, flux, conditions, device)
+            self.shifter = options.shifting.build(space, particles, flux, moving_bodies, conditions, device)
         smoothing = options.smoothing
-        needed = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
-        self.grad_F = wp.zeros(needed, dtype=space.row_gradient(space.dim**2), device=device)
+        rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
+        self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         self.steps = 0
         self.stabiliser: Stabiliser = UpwindForces(space, device)
         if is_corrected(options, policy, surface_given):
-            self.stabiliser = options.correction.build(space, particles, flux, policy, device)
+            if 0 < len(moving_bodies) < len(moving) and not isinstance(options.correction, Balance):
+                raise ValueError(
+                    f"correction must be Balance() or None where some bodies move and others do not, got "
+                    f"{options.correction}; arrangement=Current() moves all"
+                )
+            self.stabiliser = options.correction.build(space, particles, flux, policy, moving_bodies, device)
+        self.tie: TiedPairs | None = None
+        if options.tie is not None:
+            self.tie = options.tie.build(space, flux, moving, device)
         self._zero, self.loaded = wp.zeros(1, dtype=space.vec, device=device), any(c.loads for c in conditions)
         # Forces that are always zero take the memory of one
-        for name, there in (("correction", self.stabiliser.corrects), ("external", self.loaded)):
-            force = wp.zeros(n, dtype=space.vec, device=device) if there else repeated(self._zero, n)
+        there = {"correction": self.stabiliser.corrects, "tie": self.tie is not None, "external": self.loaded}
+        for name, needed in there.items():
+            force = wp.zeros(n, dtype=space.vec, device=device) if needed else repeated(self._zero, n)
             setattr(self.forces, name, force)
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         if self.stabiliser.takes_dual(configuration, sensed):
@@ -347,6 +361,8 @@ class LaxWendroffStepper:
             epsilon = options.dissipation.epsilon
             if options.dissipation.sensor is not None:
                 d = self.sensors[options.dissipation.sensor].d
+        if self.tie is not None:
+            self.tie.compute(configuration, state, forces)
         self.stabiliser.compute(configuration, self.flux.fields, v, self.grad_v, epsilon, d, forces)
         if self.loaded:
             forces.external.zero_()

@@ -15,18 +15,19 @@ from .reference import Configuration
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "correction", "limiter", "stepping", "shifting")
+ACCOUNTS = ("external", "constraint", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
+def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -35,6 +36,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
         structure(space, "State"),
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
+    Flux = structure(space, "Flux")
     precise = vector_type(space.dim, wp.float64)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
@@ -47,7 +49,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
         reference: Reference,
         state: State,
         half: State,
-        Q: wp.array(dtype=mat),
+        flux: Flux,
         grad_v: wp.array(dtype=mat),
         v_old: wp.array(dtype=vec),
         W_old: wp.array(dtype=wide),
@@ -67,7 +69,13 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
             internal = precise(forces.internal[a])
-            strain_power = wide(reference.V[a]) * wp.ddot(precise_mat(Q[a]), precise_mat(grad_v[a]))
+            strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
+            strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate)
+            tie = wide(0.0)
+            if wp.static(tied):
+                tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
+                strain_power -= tied_power
+                tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
             stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
             limiter = wide(0.0)
             if wp.static(limited):
@@ -80,6 +88,7 @@ def _make_entries(space: Space, limited: bool, smoothed: bool) -> Any:
                 wp.dot(impulse, v_mean),
                 dt * wp.dot(precise(forces.dissipation[a]), v_mean),
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
+                tie,
                 limiter,
                 stepping,
                 wide(0.0),
@@ -227,13 +236,14 @@ class Ledger:
         ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (n,) of vec.
         """
         self.flux.energy(U.F, self._W)
-        arguments = [self.particles, self.configuration.fields, U, half, self.flux.fields.Q, grad_v]
+        arguments = [self.particles, self.configuration.fields, U, half, self.flux.fields, grad_v]
         dv = smoothed
         if dv is None:
             dv = self.limiter.dv if self.limiter is not None else self._v_old
         arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
         arguments += [self.clock.fields, forces]
-        self._book(_make_entries(self.space, self.limiter is not None, smoothed is not None), arguments)
+        tied = len(self.flux.fields.tie) > 0
+        self._book(_make_entries(self.space, tied, self.limiter is not None, smoothed is not None), arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""

@@ -41,7 +41,9 @@ class PairAreas:
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, device: Any) -> "ClosedPairs":
+    def build(
+        self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, moving: list[range], device: Any
+    ) -> "ClosedPairs":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return ClosedPairs(self, space, particles, flux.bodies, device)
 

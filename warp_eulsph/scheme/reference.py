@@ -3,6 +3,7 @@
 import functools
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -228,9 +229,12 @@ def _make_defect(space: Space) -> Any:
 class Configuration:
     """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
 
+    Nothing in it moves (``fixed``) where ``moving`` is empty.
+
     Args:
         box: lengths of the periodic box [m], zero where open.
-        fixed: the initial configuration stays the reference, F_k = I.
+        moving: the particles whose arrangement a refresh reads anew, all by default; the others keep that of the
+            start, F_k = I.
         corrected: something changes L or the pair vectors after M3 (M10 to M13). Where nothing does and the reference
             is fixed, arrays of the same values are one.
 
@@ -249,12 +253,15 @@ class Configuration:
         box: Any,
         device: Any,
         *,
-        fixed: bool = False,
+        moving: Sequence[range] | None = None,
         corrected: bool = True,
     ):
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
+        fixed = moving is not None and not moving
         self.fixed, self._plain = fixed, fixed and not corrected
+        self._adopting: Sequence[range] = [range(n)]  # all at the start, then those that move
+        self._moving = [range(n)] if moving is None else moving
         self.simd, self._launch = simd(device), Launcher(device)
         self.fields = allocate(space, "Reference", n, device, empty=("F",) if fixed else ("resolution",))
         if self._plain:
@@ -279,7 +286,10 @@ class Configuration:
 
     def move(self, state: Any) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
-        self._launch(_make_adopt(self.space, self.fixed), len(state.x), [state, self.particles, self.fields])
+        for body in self._adopting:
+            arguments = [state, self.particles, self.fields]
+            self._launch(_make_adopt(self.space, self.fixed), len(body), arguments, body.start)
+        self._adopting = self._moving
         self.lists.count_neighbours(self.fields.x)
 
     def renew(self) -> None:

@@ -47,13 +47,15 @@ class Shifting:
                 f"shifting bound must be in (0, 0.25] spacings, got {self.bound}; 0.05 is the tested value"
             )
 
-    def build(self, space: Space, particles: Any, flux: Flux, conditions: Sequence[Bound], device: Any) -> "Shifter":
+    def build(
+        self, space: Space, particles: Any, flux: Flux, moving: list[range], conditions: Sequence[Bound], device: Any
+    ) -> "Shifter":
         """Allocate.
 
         Raises:
             ValueError: a material with a history, which is not remapped.
         """
-        return Shifter(self, space, particles, flux, conditions, device)
+        return Shifter(self, space, particles, flux, moving, conditions, device)
 
 
 @functools.cache
@@ -134,6 +136,7 @@ class Shifter:
         space: Space,
         particles: Any,
         flux: Flux,
+        moving: list[range],
         conditions: Sequence[Bound],
         device: Any,
     ):
@@ -141,7 +144,9 @@ class Shifter:
             raise ValueError("shifting cannot remap the history of a material; use shifting=None")
         self.option, self.space, self.particles, self.device = option, space, particles, device
         n = len(particles.mass)
-        free = np.ones(n, dtype=np.int32)
+        free = np.zeros(n, dtype=np.int32)
+        for body in moving:
+            free[body.start : body.stop] = 1
         for condition in conditions:
             if type(condition).impose is not Bound.impose:
                 free[condition.indices] = 0

@@ -25,7 +25,9 @@ class SurfaceVectors:
 
     project: bool = False
 
-    def build(self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, device: Any) -> "SurfaceForces":
+    def build(
+        self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, moving: list[range], device: Any
+    ) -> "SurfaceForces":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return SurfaceForces(self, space, particles, flux.bodies, device)
 

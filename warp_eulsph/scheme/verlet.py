@@ -13,6 +13,7 @@ from .health import check
 from .lax_wendroff import LaxWendroffStepper, check_shifting
 from .limiter import FluxCorrectedTransport
 from .shifting import Shifting
+from .tie import Tie
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,14 @@ class Verlet:
             zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
         shifting: what keeps the arrangement even in a moving reference (M15), with Balance() only; None shifts nothing.
+        tie: what ties positions to F where the arrangement does not move (M16); None leaves hourglass modes free.
     """
 
     dissipation: Upwind | None = Upwind()
     correction: Any = Balance()
     limiter: FluxCorrectedTransport | None = None
     shifting: Shifting | None = None
+    tie: Tie | None = Tie()
     smoothing: ClassVar[None] = None
     #: Tested Courant number; the limit is 1.1 to 1.3 in bounded 3-D bodies.
     cfl: ClassVar[float] = 0.8
