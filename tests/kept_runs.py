@@ -24,7 +24,8 @@ def plate(young=17e6, reference=es.Every(3)):
     rubber = es.NeoHookean(density=1100.0, young=young, poisson=0.45)
     body = es.Body(x=x, volume=1 / 36, material=rubber, velocity=20.0 * np.sin(3.0 * x[:, ::-1]), name="plate")
     held = es.Fixed(lambda X: X[:, 0] < 1 / 6)
-    return es.Simulation(body, boundaries=[held], reference=reference, time_step=es.TimeStep(cfl=0.3))
+    step = es.TimeStep(cfl=0.3)
+    return es.Simulation(body, boundaries=[held], reference=reference, arrangement=es.Current(), time_step=step)
 
 
 def recording(simulation, **changes):

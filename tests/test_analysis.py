@@ -37,7 +37,7 @@ def script(monkeypatch):
 def test_energy_balance_closes(script, plates, capsys):
     shares = script("energy_balance").main([str(plates[0])])
     assert abs(shares["residual"]) < 1e-12 and 0.9 < shares["total"] <= 1.0 + 1e-4
-    assert shares["kinetic"] + shares["stored"] == pytest.approx(shares["total"], abs=1e-12)
+    assert shares["kinetic"] + shares["stored"] + shares["tied"] == pytest.approx(shares["total"], abs=1e-12)
     assert (plates[0] / "energy_balance.png").stat().st_size > 10_000
     assert "dissipation" in capsys.readouterr().out
 

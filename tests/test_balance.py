@@ -18,7 +18,9 @@ def disordered(dim, correction, dtype=wp.float64, n=None):
     n = COUNT[dim] if n is None else n
     x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
     scheme = es.Verlet(correction=correction)
-    simulation = es.Simulation(es.Body(x=x, volume=volume, material=RUBBER), scheme=scheme, dtype=dtype)
+    simulation = es.Simulation(
+        es.Body(x=x, volume=volume, material=RUBBER), arrangement=es.Current(), scheme=scheme, dtype=dtype
+    )
     stepper, rng = simulation.stepper, np.random.default_rng(5)
     stepper.U.x.assign(x + rng.uniform(-0.15, 0.15, x.shape) / n)
     stepper.U.F.assign(np.eye(dim) * rng.uniform(0.97, 1.06, len(x))[:, None, None])
@@ -79,7 +81,7 @@ def test_balance_takes_the_short_waves_of_the_defect(dim):
     for correction in (None, es.Balance()):
         body = es.Body(x=x, volume=volume, material=RUBBER, surface=0.0)
         scheme = es.Verlet(correction=correction)
-        simulation = es.Simulation(body, scheme=scheme, periodic=(1.0,) * dim)
+        simulation = es.Simulation(body, arrangement=es.Current(), scheme=scheme, periodic=(1.0,) * dim)
         stepper = simulation.stepper
         stepper.U.x.assign(x + pairing)
         stepper.configuration.refresh(stepper.U)
@@ -93,7 +95,7 @@ def test_balance_takes_the_short_waves_of_the_defect(dim):
 def test_smoothing_length_follows_the_volume(dim):
     """A reference at twice the size in every direction has twice the smoothing lengths and the same neighbours."""
     x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / 6)
-    simulation = es.Simulation(es.Body(x=x, volume=volume, material=RUBBER))
+    simulation = es.Simulation(es.Body(x=x, volume=volume, material=RUBBER), arrangement=es.Current())
     stepper = simulation.stepper
     near = stepper.configuration.near.index.numpy()[: stepper.configuration.lists.pairs].copy()
     for factor, grown in ((1.5, 1.5), (0.7, 0.7), (3.0, 2.0)):  # growth ends at 2
@@ -108,7 +110,8 @@ def test_smoothing_length_follows_the_volume(dim):
 def plate(n, scheme, reference, cfl=None, omega=105.0):
     x, volume = box((-0.5, -0.5), (0.5, 0.5), 1 / n)
     body = es.Body(x=x, volume=volume, material=RUBBER, velocity=omega * np.c_[-x[:, 1], x[:, 0]])
-    return es.Simulation(body, scheme=scheme, reference=reference, time_step=es.TimeStep(cfl=cfl))
+    step = es.TimeStep(cfl=cfl)
+    return es.Simulation(body, arrangement=es.Current(), scheme=scheme, reference=reference, time_step=step)
 
 
 @pytest.mark.parametrize("reference", [es.Never(), es.Every(4), es.Always()], ids=repr)
@@ -152,7 +155,7 @@ def test_bounded_bodies_hold_in_three_dimensions(reference, cfl):
     """
     x, volume = box((-0.5,) * 3, (0.5,) * 3, 1 / 6)
     body = es.Body(x=x, volume=volume, material=RUBBER, velocity=105.0 * np.c_[-x[:, 1], x[:, 0], 0.0 * x[:, 0]])
-    simulation = es.Simulation(body, reference=reference, time_step=es.TimeStep(cfl=cfl))
+    simulation = es.Simulation(body, arrangement=es.Current(), reference=reference, time_step=es.TimeStep(cfl=cfl))
     start, spin = simulation.energy()["total"], simulation.angular_momentum()[2]
     for _ in simulation.frames(np.linspace(0.0, 0.015, 31)[1:]):
         assert simulation.energy()["total"] <= start * (1.0 + 1e-4)
@@ -170,7 +173,7 @@ def test_a_body_pulled_apart_has_free_faces(speed):
     left = x[:, 0] < 0.0
     material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
     body = es.Body(x=x, volume=volume, material=material, velocity=speed * np.sign(x[:, :1]) * [1.0, 0.0])
-    simulation = es.Simulation(body)
+    simulation = es.Simulation(body, arrangement=es.Current())
     inner = left & (x[:, 0] > -0.05)
     assert np.abs(simulation.stepper.U.surface.numpy()[inner, 0]).max() < 0.01 * 0.05
     start = simulation.energy()["total"]
@@ -210,7 +213,9 @@ def test_particles_at_a_clamp_keep_apart():
     """A bending column: what pairs up above its held layer takes 3 % of the energy by 0.6 s without the lean."""
     kept = {}
     for lean in (0.0, 1.0):
-        simulation = bending_column.build(2, 20, es.Always(), scheme=es.Verlet(correction=es.Balance(lean=lean)))
+        simulation = bending_column.build(
+            2, 20, es.Always(), arrangement=es.Current(), scheme=es.Verlet(correction=es.Balance(lean=lean))
+        )
         start = simulation.energy()["total"]
         simulation.run(0.6)
         kept[lean] = simulation.energy()["total"] / start

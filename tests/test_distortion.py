@@ -117,7 +117,7 @@ def test_vortex_converges_at_a_shear_of_one():
 def test_uniform_shear_exerts_no_force_with_exact_surface_vectors(reference):
     """M10: whatever the arrangement, the particles keep the exact motion."""
     scheme = es.Verlet(correction=es.SurfaceVectors())
-    simulation, upper = shear.build(12, reference, scheme=scheme)
+    simulation, upper = shear.build(12, reference, arrangement=es.Current(), scheme=scheme)
     simulation.run(2.0 / shear.RATE)
     now = shear.errors(simulation, upper)
     assert max(now["F"], now["stress"]) < 1e-10
@@ -128,7 +128,7 @@ def test_uniform_shear_exerts_no_force_with_exact_surface_vectors(reference):
 def test_whole_correction_keeps_the_sheared_block():
     """M11 without the bound on energy: 0.1 % of F and stress at a shear of 5, as in docs/distortion.md."""
     scheme = es.Verlet(correction=es.PairAreas(kappa=np.inf))
-    simulation, upper = shear.build(12, es.Always(), scheme=scheme)
+    simulation, upper = shear.build(12, es.Always(), arrangement=es.Current(), scheme=scheme)
     simulation.run(5.0 / shear.RATE)
     now = shear.errors(simulation, upper)
     assert max(now["F"], now["stress"]) < 1e-3

@@ -35,7 +35,14 @@ def disordered(dim, dtype, reference, **options):
         es.Body(x=x + shift, volume=volume, material=material, velocity=8.0 * rng.normal(size=x.shape), name=name)
         for name, shift in (("one", 0.0), ("two", 0.3))
     ]
-    return es.Simulation(bodies, reference=reference, dtype=dtype, time_step=es.TimeStep(fixed=2e-6), **options)
+    return es.Simulation(
+        bodies,
+        reference=reference,
+        arrangement=es.Current(),
+        dtype=dtype,
+        time_step=es.TimeStep(fixed=2e-6),
+        **options,
+    )
 
 
 def results(simulation, steps):
@@ -123,7 +130,9 @@ def test_simd_equals_portable_in_a_periodic_box(dim, dtype):
         execution.set_simd(simd)
         material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
         body = es.Body(x=x, volume=volume, material=material, velocity=velocity, surface=0.0)
-        simulation = es.Simulation(body, periodic=(1.0,) * dim, dtype=dtype, time_step=es.TimeStep(fixed=2e-6))
+        simulation = es.Simulation(
+            body, periodic=(1.0,) * dim, dtype=dtype, time_step=es.TimeStep(fixed=2e-6), arrangement=es.Current()
+        )
         found[simd] = results(simulation, 10)
     assert_equal_to_round_off(found[False], found[True], dtype)
 

@@ -43,7 +43,7 @@ def block(dim, reference, **options):
     x, volume = cloud(dim, SIDE[dim], jitter=0.15)
     velocity = 8.0 * np.random.default_rng(2).normal(size=x.shape)
     body = es.Body(x=x, volume=volume, material=RUBBER, velocity=velocity, **options.pop("body", {}))
-    return es.Simulation(body, reference=reference, **options)
+    return es.Simulation(body, reference=reference, **{"arrangement": es.Current(), **options})
 
 
 def bits(simulation):
@@ -169,7 +169,7 @@ def test_box_too_small_is_refused_from_graphs_too():
         execution.set_graphs(on)
         s = (np.arange(5) + 0.5) / 5
         body = es.Body(x=s[:, None], volume=0.2, material=RUBBER, surface=0.0)
-        simulation = es.Simulation(body, periodic=(1.0,), dilation=1.2)
+        simulation = es.Simulation(body, periodic=(1.0,), dilation=1.2, arrangement=es.Current())
         simulation.step(5)
         simulation.stepper.particles.h.fill_(0.3)
         with pytest.raises(ValueError, match="box length along axis 0 must be at least twice the support radius"):

@@ -51,6 +51,7 @@ def blocks(dim, reference=es.Always(), scheme=es.Verlet(), dtype=wp.float64):
         bodies,
         boundaries=boundaries,
         reference=reference,
+        arrangement=es.Current(),
         scheme=scheme,
         time_step=es.TimeStep(growth=1.05),
         dtype=dtype,

@@ -17,7 +17,14 @@ def disordered(dim, n, velocity, dtype=wp.float64, F=1.0, reference=es.Always(),
     """A block whose inner particles were disturbed after the start, so that there is something to even out."""
     x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
     body = es.Body(x=x, volume=volume, material=RUBBER, velocity=velocity(x))
-    simulation = es.Simulation(body, scheme=scheme, dtype=dtype, reference=reference, boundaries=boundaries)
+    simulation = es.Simulation(
+        body,
+        arrangement=es.Current(),
+        scheme=scheme,
+        dtype=dtype,
+        reference=reference,
+        boundaries=boundaries,
+    )
     inner = ((x > 2.9 / n) & (x < 1.0 - 2.9 / n)).all(axis=1)
     moved = np.where(inner[:, None], np.random.default_rng(3).uniform(-0.2, 0.2, x.shape) / n, 0.0)
     stepper = simulation.stepper
@@ -108,11 +115,13 @@ def test_shear_goes_on_where_the_default_is_lost():
 
     Both without the lean, which holds the particles where they are.
     """
-    simulation, upper = shear.build(12, es.Always(), scheme=EVEN)
+    simulation, upper = shear.build(12, es.Always(), arrangement=es.Current(), scheme=EVEN)
     simulation.run(0.3)
     errors = shear.errors(simulation, upper)
     assert errors["F"] < 0.03 and errors["stress"] < 0.03 and abs(errors["energy"] - 1.0) < 0.005
-    simulation, upper = shear.build(12, es.Always(), scheme=es.Verlet(correction=EVEN.correction))
+    simulation, upper = shear.build(
+        12, es.Always(), arrangement=es.Current(), scheme=es.Verlet(correction=EVEN.correction)
+    )
     simulation.run(0.2)
     assert shear.errors(simulation, upper)["F"] > 0.5
 
@@ -121,7 +130,7 @@ def test_bodies_that_need_none_hardly_change():
     """The plate at 105 rad/s, 16 across, 1.7 turns: energy and spin as without shifting, to 3e-4 and 1e-4."""
     kept, spin = {}, {}
     for scheme in (es.Verlet(), SHIFTED):
-        simulation = spinning_plate.build(16, es.Always(), scheme=scheme)
+        simulation = spinning_plate.build(16, es.Always(), arrangement=es.Current(), scheme=scheme)
         start, about = simulation.energy()["total"], simulation.angular_momentum()[0]
         simulation.run(0.1)
         kept[scheme], spin[scheme] = simulation.energy()["total"] / start, simulation.angular_momentum()[0] / about

@@ -33,7 +33,9 @@ def spin(x, omega=60.0):
 @pytest.mark.parametrize("reference", REFERENCES, ids=repr)
 @pytest.mark.parametrize("scheme", [es.Verlet(), es.LaxWendroff(correction=es.PairAreas())], ids=["default", "M12"])
 def test_momentum_is_exact_and_the_books_close(dim, reference, scheme):
-    simulation = es.Simulation(block(dim, {1: 20, 2: 8, 3: 5}[dim], spin), reference=reference, scheme=scheme)
+    simulation = es.Simulation(
+        block(dim, {1: 20, 2: 8, 3: 5}[dim], spin), reference=reference, arrangement=es.Current(), scheme=scheme
+    )
     momentum = simulation.momentum()
     simulation.step(40)
     energy = simulation.energy()
@@ -53,7 +55,7 @@ def test_projected_surface_vectors_keep_both_momenta():
         body = block(2, 8, spin)
         kept = body.x.sum(axis=1) < 0.3  # a cut corner: a symmetric body would hide the drift
         body = es.Body(x=body.x[kept], volume=1 / 64, material=body.material, velocity=body.velocity[kept])
-        simulation = es.Simulation(body, scheme=scheme)
+        simulation = es.Simulation(body, arrangement=es.Current(), scheme=scheme)
         momentum = simulation.momentum()
         simulation.step(60)
         drifts[project] = np.abs(simulation.momentum() - momentum).max()
@@ -66,7 +68,7 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
 
     def powers(stepper, kappa):
         stabiliser = es.PairAreas(kappa=kappa).build(
-            stepper.space, stepper.particles, stepper.flux, stepper.policy, stepper.device
+            stepper.space, stepper.particles, stepper.flux, stepper.policy, stepper.flux.bodies, stepper.device
         )
         assert stabiliser.takes_dual(stepper.configuration, sensed=False)
         stepper.flux.keep_dual()
@@ -80,7 +82,9 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
 
     body = block(2, 10, spin)
     wild = body.velocity + np.random.default_rng(0).normal(size=body.x.shape)
-    simulation = es.Simulation(es.Body(x=body.x, volume=body.volume, material=body.material, velocity=wild))
+    simulation = es.Simulation(
+        es.Body(x=body.x, volume=body.volume, material=body.material, velocity=wild), arrangement=es.Current()
+    )
     fed = []
     for _ in range(60):
         simulation.step()
@@ -95,7 +99,7 @@ def test_uniform_stress_acts_on_the_surface_vectors_only():
     errors = {}
     for correction in (None, es.PairAreas(kappa=math.inf, iterations=100)):
         body = block(2, 12, lambda x: 0.0 * x)
-        simulation = es.Simulation(body, scheme=es.LaxWendroff(correction=correction, smoothing=None))
+        simulation = es.Simulation(body, arrangement=es.Current(), scheme=es.LaxWendroff(correction=correction))
         stepper = simulation.stepper
         jitter = np.random.default_rng(3).uniform(-0.1, 0.1, body.x.shape) / 12
         stepper.U.x.assign(body.x + jitter)
@@ -117,7 +121,7 @@ def test_more_iterations_than_needed_do_no_harm(dtype):
     """A warm start that is converged already leaves nothing to divide by: ψ must stay, not wander off."""
     body = block(2, 8, spin)
     scheme = es.LaxWendroff(correction=es.PairAreas(kappa=math.inf, iterations=150))
-    simulation = es.Simulation(body, scheme=scheme, dtype=dtype)
+    simulation = es.Simulation(body, arrangement=es.Current(), scheme=scheme, dtype=dtype)
     simulation.step(3)
     stepper = simulation.stepper
     settled = []
@@ -177,7 +181,7 @@ def test_references_agree_where_all_apply():
 
 
 def test_steps_allocate_nothing():
-    simulation = es.Simulation(block(2, 8, spin))
+    simulation = es.Simulation(block(2, 8, spin), arrangement=es.Current())
     simulation.step(5)
     stepper = simulation.stepper
 

@@ -21,13 +21,14 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) ->
     Args:
         space: dimension and precision.
         reach: support radius in spacings, which says how many neighbours there are.
-        moving: whether the reference moves: lists with room to grow, what a search needs, balanced positions.
+        moving: whether the arrangement moves: lists with room to grow, what a search needs, balanced positions. Where
+            it does not, positions are tied to F.
         device: SIMD kernels of the CPU keep packed rows.
     """
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
     absent = {"Forces.correction", "Forces.external"} | ({"Flux.Pi"} if vectors else set())
-    absent |= {"Reference.resolution"} if moving else {"Reference.F", "Reference.balanced"}
+    absent |= {"Reference.resolution", "Flux.tie", "Forces.tie"} if moving else {"Reference.F", "Reference.balanced"}
     present = [
         field for group, fields in GROUPS.items() for name, field in fields.items() if f"{group}.{name}" not in absent
     ]
@@ -35,6 +36,8 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) ->
     ints, doubles = 4, 2 + 2 * 7 / 64  # body, number, start, poor; energies, blocks of the books
     if vectors:
         reals += LANES * (2 + 2 * d)
+    if not moving:
+        reals += LANES * (1 + d)
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1

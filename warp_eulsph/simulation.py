@@ -78,6 +78,7 @@ class Simulation:
         self.space = Space(X.shape[1], dtype, periodic is not None)
         self.device = wp.get_device(device)
         self.boundaries = tuple(boundaries)
+        self.reference, self.arrangement = reference, arrangement
         check_reference([body.material for body in self.bodies], reference)
         moving = [not reference.fixed and arrangement.moves(body.material) for body in self.bodies]
         if not any(moving):

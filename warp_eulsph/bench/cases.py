@@ -8,6 +8,7 @@ import warp as wp
 
 from ..geometry import box
 from ..materials import Material, NeoHookean
+from ..scheme.arrangement import Current
 from ..scheme.reference import Always, Every, Never, ReferencePolicy
 from ..simulation import Body, Simulation
 
@@ -24,7 +25,7 @@ class BenchCase:
         name: as ``-k`` selects it.
         dim: dimension.
         dtype: "float32" or "float64".
-        mode: "total", "every_k" (refreshed every tenth step) or "eulerian".
+        mode: "total", "every_k" (refreshed every tenth step) or "eulerian"; the arrangement is the current one.
         side: particles along each axis.
         threads: threads on the CPU.
         order: of the particles in memory: that of the lattice, "shuffled", or shuffled and "sorted" by the simulation.
@@ -53,7 +54,13 @@ class BenchCase:
             velocity[:, 0] -= 10.0 * x[:, 1]
             velocity[:, 1] += 10.0 * x[:, 0]
         body = Body(x=x, volume=volume, spacing=1.0 / self.side, material=self.material, velocity=velocity)
-        return Simulation(body, reference=MODES[self.mode], dtype=DTYPES[self.dtype], sort=self.order != "shuffled")
+        return Simulation(
+            body,
+            reference=MODES[self.mode],
+            arrangement=Current(),
+            dtype=DTYPES[self.dtype],
+            sort=self.order != "shuffled",
+        )
 
 
 def _all() -> Iterator[BenchCase]:

@@ -9,6 +9,7 @@ from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..materials import Material
 from ..output import FIELDS, Probe
+from ..scheme.arrangement import Arrangement
 from ..scheme.lax import Lax
 from ..scheme.lax_wendroff import LaxWendroff
 from ..scheme.reference import ReferencePolicy
@@ -83,6 +84,7 @@ class Case(Problem):
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
     boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
+    arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
     sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
@@ -114,6 +116,7 @@ class Case(Problem):
             bodies,
             boundaries=[*conditions, *ghosts],
             reference=self.reference.make(),
+            arrangement=self.arrangement.make(),
             scheme=self.scheme.make(),
             time_step=self.time_step.make(),
             weight=weight,

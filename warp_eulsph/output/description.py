@@ -52,7 +52,8 @@ def _solids(simulation: Simulation) -> dict[str, Any]:
     conditions = zip(simulation.boundaries, simulation.conditions, strict=True)
     return {
         "scheme": plain(stepper.options),
-        "reference": plain(stepper.policy),
+        "reference": plain(simulation.reference),
+        "arrangement": plain(simulation.arrangement),
         "time_step": plain(simulation.clock.option),
         "dilation": simulation.dilation,
         "sort": simulation.sorting.on,

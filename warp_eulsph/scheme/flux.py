@@ -103,15 +103,16 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_modulus(space: Space, law: Law) -> Any:
-    """Kernel of one thread: the modulus of pressure waves at F = I."""
-    real, dim, Constants, moduli = space.real, space.dim, law.Constants, law.wave_moduli
+def _make_moduli(space: Space, law: Law) -> Any:
+    """Kernel of one thread: the wave moduli at F = I."""
+    real, dim, pair, Constants, moduli = space.real, space.dim, space.row(2), law.Constants, law.wave_moduli
 
     @wp.kernel(module="unique", enable_backward=False)
-    def modulus(c: Constants, out: wp.array(dtype=real)):
-        out[0] = moduli(wp.identity(n=wp.static(dim), dtype=real), c)[0]
+    def moduli_at_rest(c: Constants, out: wp.array(dtype=pair)):
+        M = moduli(wp.identity(n=wp.static(dim), dtype=real), c)
+        out[0] = pair(M[0], M[1])
 
-    return modulus
+    return moduli_at_rest
 
 
 @functools.cache
@@ -212,13 +213,13 @@ class Flux:
         if not len(self.fields.Pi):
             self.fields.Pi = wp.zeros_like(self.fields.Q)
 
-    def moduli(self) -> list[float]:
-        """Modulus of pressure waves at F = I [Pa] of each body; reads the device."""
+    def moduli(self) -> list[tuple[float, float]]:
+        """Moduli of pressure and of shear waves at F = I [Pa] of each body; reads the device."""
         found = []
         for part in self.parts:
-            out = wp.zeros(1, dtype=self.space.real, device=self.device)
-            wp.launch(_make_modulus(self.space, part.law), 1, [part.constants, out], device=self.device)
-            found.append(float(out.numpy()[0]))
+            out = wp.zeros(1, dtype=self.space.row(2), device=self.device)
+            wp.launch(_make_moduli(self.space, part.law), 1, [part.constants, out], device=self.device)
+            found.append((float(out.numpy()[0, 0]), float(out.numpy()[0, 1])))
         return found
 
     def compute(self, F: wp.array, configuration: Configuration) -> None:

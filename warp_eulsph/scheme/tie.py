@@ -17,7 +17,7 @@ from .reference import Configuration
 
 @dataclass(frozen=True)
 class Tie:
-    """Pair energy ¼ Σ_a Σ_b χ M V_a w_ab |r_ab|², r_ab = ξ_ab − ½(F_a + F_b) ξ⁰_ab, its adjoint in the stress (M16).
+    """Pair energy ¼ Σ_a Σ_b χ Ē V_a w_ab |r_ab|², r_ab = ξ_ab − ½(F_a + F_b) ξ⁰_ab, its adjoint in the stress (M16).
 
     Positions may run away from F in modes that a gradient averages out (hourglass modes), and irregular arrangements
     push particles about in them. r vanishes for linear fields, and for quadratic ones as far as F is exact there.
@@ -26,16 +26,17 @@ class Tie:
     It acts where the arrangement does not move, whose initial positions are the labels ξ⁰.
 
     Args:
-        stiffness: χ, over the modulus of pressure waves. Up to 1 it raises the highest frequency of a body, and so the
-            cost of a step, by less than a tenth (``tests/test_tie.py``).
+        stiffness: χ, over Ē, the modulus of pressure waves M or 4μ, whichever is less: M where Poisson's ratio is ⅓.
+            Beyond that volume would resist what the tie is to hold, and coarse bodies lock. At 1 it raises the highest
+            frequency of a body, and so the cost of a run, by less than a tenth (``tests/test_tie.py``).
     """
 
-    stiffness: float = 0.3
+    stiffness: float = 1.0
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.stiffness) and 0.0 < self.stiffness <= 1.0):
             raise ValueError(
-                f"tie stiffness must be in (0, 1], got {self.stiffness}; 0.3 is the tested value, tie=None has none"
+                f"tie stiffness must be in (0, 1], got {self.stiffness}; 1 is the tested value, tie=None has none"
             )
 
     def build(self, space: Space, flux: Flux, moving: list[bool], device: Any) -> "TiedPairs | None":
@@ -156,7 +157,7 @@ def _tied_sums(space: Space, simd: bool) -> Any:
 
 @functools.cache
 def _make_tie(space: Space, simd: bool, dual: bool) -> Any:
-    """Kernel: force of the tie, and its stress −½ χ M Σ_b w_ab r_ab ⊗ ξ⁰_ab, added to Q (M16)."""
+    """Kernel: force of the tie, and its stress −½ χ Ē Σ_b w_ab r_ab ⊗ ξ⁰_ab, added to Q (M16)."""
     real, Reference, Neighbours = space.real, structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
     sums_of = _tied_sums(space, simd)
@@ -189,8 +190,8 @@ class TiedPairs:
         self.space, self.flux, self._launch = space, flux, Launcher(device)
         n = len(flux.fields.Q)
         self._tied = [
-            (body, option.stiffness * modulus)
-            for body, modulus, moves in zip(flux.bodies, flux.moduli(), moving, strict=True)
+            (body, option.stiffness * (min(M, 4.0 * mu) if space.dim > 1 else M))
+            for body, (M, mu), moves in zip(flux.bodies, flux.moduli(), moving, strict=True)
             if not moves
         ]
         self._rows = packed_rows(space, n, 1 + space.dim, device)

@@ -16,6 +16,7 @@ import numpy as np
 from .. import fields
 from ..geometry import box
 from ..materials import Material, NeoHookean
+from ..scheme.arrangement import Current
 from ..scheme.lax_wendroff import LaxWendroff
 from ..scheme.reference import Always, Never, ReferencePolicy
 from ..scheme.time_step import TimeStep
@@ -84,8 +85,8 @@ class Step:
     """The step of a point's scheme as a map of deviations from the state at rest.
 
     A deviation is an array (n, c) with, per particle, those of x (in spacings), v (in wave speeds), F and the surface
-    vector. Total Lagrangian, x and the surface vector feed back on nothing and are left
-    out.
+    vector. Total Lagrangian the surface vector feeds back on nothing, nor does x without a tie (M16): they are
+    left out. A moving reference is that of the current arrangement.
 
     Attributes:
         simulation: the simulation that steps.
@@ -101,6 +102,7 @@ class Step:
         self.simulation = Simulation(
             body,
             reference=point.reference,
+            arrangement=Current(),
             scheme=point.scheme,
             time_step=TimeStep(fixed=1.0),
             weight=point.weight,
@@ -111,7 +113,8 @@ class Step:
         self.moving = not point.reference.fixed
         self._strain()
         shapes = {"x": (dim,), "v": (dim,), "F": (dim, dim), "surface": (dim,)}
-        self.shapes = {name: shapes[name] for name in fields.STATE if self.moving or name in ("v", "F")}
+        feeding = set(fields.STATE) if self.moving else {"v", "F"} | ({"x"} if point.scheme.tie is not None else set())
+        self.shapes = {name: shapes[name] for name in fields.STATE if name in feeding}
         self._rest = self._read()
 
     @property

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ... import Always, Body, NeoHookean, ReferencePolicy, Simulation, TimeStep, Velocity, Verlet
+from ... import Always, Body, Current, NeoHookean, ReferencePolicy, Simulation, TimeStep, Velocity, Verlet
 from ...geometry import box
 from ...output import Figure
 from ..case import Case
@@ -84,6 +84,7 @@ def build(n: int, period: float, reference: ReferencePolicy = Always()) -> Simul
         body,
         boundaries=[Velocity(value=make_flow(period))],
         reference=reference,
+        arrangement=Current(),
         scheme=Verlet(dissipation=None, correction=None),
         time_step=TimeStep(fixed=1.0 / STEPS_PER_SECOND),
         dilation=1.4,
