@@ -75,7 +75,8 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
         stabiliser.refresh(stepper.configuration, stepper.U)
         stepper._velocity_gradient(stepper.U)
         stepper._stress(stepper.U)
-        arguments = [stepper.configuration, stepper.flux.fields, stepper.U.v, stepper.grad_v, 1.0, None, stepper.forces]
+        U = stepper.U
+        arguments = [stepper.configuration, stepper.flux.fields, U.x, U.v, stepper.grad_v, 1.0, None, stepper.forces]
         stabiliser.compute(*arguments)
         v = stepper.U.v.numpy()
         return (stepper.forces.correction.numpy() * v).sum(), (stepper.forces.dissipation.numpy() * v).sum()

@@ -35,7 +35,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) ->
     reals = sum(sizes[field.kind] for field in present) + 2 * d + d * d + d * d + d  # the half step, ∇v, old v
     ints, doubles = 4, 2 + 2 * 7 / 64  # body, number, start, poor; energies, blocks of the books
     if vectors:
-        reals += LANES * (2 + 2 * d)
+        reals += LANES * (3 + 2 * d)
     if not moving:
         reals += LANES * (1 + d)
     if moving:

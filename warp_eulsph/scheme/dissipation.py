@@ -37,17 +37,18 @@ class Upwind:
 def upwind(space: Space) -> Any:
     """``wp.func`` force on a from b [N]: A_ab ½ [Z n⊗n + Z_s (I − n⊗n)] · jump (M9), A_ab = V_a V_b |W'|.
 
-    Z = ½ (ρc_a + ρc_b) is the mean impedance of pressure waves, Z_s of shear waves.
+    Z = ½ (ρc_a + ρc_b) is the mean impedance of pressure waves, Z_s of shear waves; n points from a to b as they are
+    now, so that a body that turns is damped as one that does not, whatever the reference.
 
-    Args (of the function): ξ = x_b − x_a, V_a V_b g_ab, the sums 2Z and 2Z_s, velocity jump.
+    Args (of the function): ξ = x_b − x_a in the reference, now, V_a V_b g_ab, the sums 2Z and 2Z_s, velocity jump.
     """
     real, vec = space.real, space.vec
 
     @wp.func
-    def upwind(xi: vec, VVg: real, Z: real, Z_shear: real, jump: vec) -> vec:
-        rr = wp.dot(xi, xi)
-        normal = xi * (wp.dot(xi, jump) * (Z - Z_shear) / rr)
-        return (normal + jump * Z_shear) * (VVg * wp.sqrt(rr) * real(0.25))
+    def upwind(xi: vec, now: vec, VVg: real, Z: real, Z_shear: real, jump: vec) -> vec:
+        # two particles at one place have no direction, and no normal part
+        normal = now * (wp.dot(now, jump) * (Z - Z_shear) / wp.max(wp.dot(now, now), real(1e-30)))
+        return (normal + jump * Z_shear) * (VVg * wp.length(xi) * real(0.25))
 
     return upwind
 
@@ -82,6 +83,7 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
         reference: Reference,
         near: Neighbours,
         flux: Flux,
+        x: wp.array(dtype=vec),
         v: wp.array(dtype=vec),
         grad_v: wp.array(dtype=mat),
         epsilon: real,
@@ -106,7 +108,8 @@ def make_dissipation(space: Space, sensed: bool) -> Any:
             else:
                 jump = jump * epsilon
             Z, Z_shear = Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b]
-            force += pair_force(xi, V_a * near.w[k], Z, Z_shear, jump)
+            now = separation(x[b], x[a], near.box)
+            force += pair_force(xi, now, V_a * near.w[k], Z, Z_shear, jump)
         out[a] = force
 
     return dissipate
@@ -132,6 +135,7 @@ class UpwindForces(Stabiliser):
         self,
         configuration: Configuration,
         flux: Any,
+        x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
@@ -142,9 +146,9 @@ class UpwindForces(Stabiliser):
         if not self.takes_dual(configuration, sensor is not None):
             if self._in_one_pass is None:
                 self._in_one_pass = PairForces(self.space, len(v), self.device)
-            self._in_one_pass.compute(configuration, flux, v, grad_v, epsilon, forces)
+            self._in_one_pass.compute(configuration, flux, x, v, grad_v, epsilon, forces)
             return
         configuration.divergence(flux.Pi, forces.internal)
-        arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
+        arguments = [configuration.fields, configuration.near, flux, x, v, grad_v, epsilon]
         arguments += [sensor if sensor is not None else v, forces.dissipation]
         self._launch(make_dissipation(self.space, sensor is not None), len(v), arguments)

@@ -363,7 +363,7 @@ class LaxWendroffStepper:
                 d = self.sensors[options.dissipation.sensor].d
         if self.tie is not None:
             self.tie.compute(configuration, state, forces)
-        self.stabiliser.compute(configuration, self.flux.fields, v, self.grad_v, epsilon, d, forces)
+        self.stabiliser.compute(configuration, self.flux.fields, state.x, v, self.grad_v, epsilon, d, forces)
         if self.loaded:
             forces.external.zero_()
         for condition in self.conditions:

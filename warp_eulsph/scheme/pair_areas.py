@@ -91,6 +91,7 @@ def _make_dissipate(space: Space, sensed: bool) -> Any:
         reference: Reference,
         near: Neighbours,
         flux: Flux,
+        x: wp.array(dtype=vec),
         v: wp.array(dtype=vec),
         grad_v: wp.array(dtype=mat),
         epsilon: real,
@@ -117,7 +118,12 @@ def _make_dissipate(space: Space, sensed: bool) -> Any:
                 jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
             else:
                 jump = jump * epsilon
-            upwind_ab = pair_force(xi, VVg, Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b], jump)
+            now, Z, Z_shear = (
+                separation(x[b], x[a], near.box),
+                Z_a + flux.impedance[b],
+                Z_shear_a + flux.shear_impedance[b],
+            )
+            upwind_ab = pair_force(xi, now, VVg, Z, Z_shear, jump)
             dissipation += upwind_ab
             dissipated += wp.dot(upwind_ab, plain)
             p_ab = -wp.dot((Q_a + flux.Q[b]) @ (psi_a - psi[b]), plain) * real(0.5) * VVg
@@ -190,6 +196,7 @@ class ClosedPairs(Stabiliser):
         self,
         configuration: Configuration,
         flux: Any,
+        x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
@@ -199,12 +206,12 @@ class ClosedPairs(Stabiliser):
         """Internal force (M5), dissipation (M9) and correction (M11, M12) into ``forces``."""
         if self.option.limited:
             configuration.divergence(flux.Pi, forces.internal)
-            arguments = [configuration.fields, configuration.near, flux, v, grad_v, epsilon]
+            arguments = [configuration.fields, configuration.near, flux, x, v, grad_v, epsilon]
             arguments += [sensor if sensor is not None else v, self.solver.psi, self.option.kappa]
             arguments += [forces.dissipation, self.admission]
             wp.launch(_make_dissipate(self.space, sensor is not None), len(v), arguments, device=self.device)
         else:
-            self.upwind.compute(configuration, flux, v, grad_v, epsilon, sensor, forces)
+            self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
         arguments = [configuration.fields, configuration.near, flux.Q, v, self.solver.psi, self.admission]
         arguments += [forces.correction]
         wp.launch(_make_correct(self.space, self.option.limited), len(v), arguments, device=self.device)

@@ -13,8 +13,8 @@ from .reference import Configuration
 
 
 def _vectors(space: Space) -> int:
-    """Rows of four: x with the impedance, v with the shear impedance, columns of −½∇v, columns of Π with x̂."""
-    return 2 + 2 * space.dim
+    """Rows of four: x_k with the impedance, v with the shear impedance, x, columns of −½∇v, columns of Π with x̂."""
+    return 3 + 2 * space.dim
 
 
 @functools.cache
@@ -22,25 +22,27 @@ def _make_pack(space: Space) -> Any:
     """Kernel: what the pass reads of a neighbour, side by side; Π = Q Lᵀ (M5) is made here."""
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
-    first_grad, first_Pi = 8, 8 + 4 * dim
+    first_grad, first_Pi = 12, 12 + 4 * dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def pack(
         first: int,
         reference: Reference,
         flux: Flux,
+        x: wp.array(dtype=vec),
         v: wp.array(dtype=vec),
         grad_v: wp.array(dtype=mat),
         rows: wp.array2d(dtype=real),
     ):
         a = first + wp.tid()
-        x_a, v_a, grad_a, balanced_a = reference.x[a], v[a], grad_v[a], reference.balanced[a]
+        x_a, now_a, v_a, grad_a, balanced_a = reference.x[a], x[a], v[a], grad_v[a], reference.balanced[a]
         Pi_a = flux.Q[a] @ wp.transpose(reference.L[a])
         rows[a, 3] = flux.impedance[a]
         rows[a, 7] = flux.shear_impedance[a]
         for i in range(wp.static(dim)):
             rows[a, i] = x_a[i]
             rows[a, 4 + i] = v_a[i]
+            rows[a, 8 + i] = now_a[i]
             rows[a, first_Pi + 4 * i + 3] = balanced_a[i]
             for j in range(wp.static(dim)):
                 rows[a, first_grad + 4 * j + i] = grad_a[i, j] * real(-0.5)
@@ -68,38 +70,41 @@ def _make_forces(space: Space) -> Any:
         return both(q, q);
     }};
     // impedances are added where the rest is subtracted
-    const V x_a = own(0, -1), v_a = own(1, -1);
+    const V x_a = own(0, -1), v_a = own(1, -1), now_a = own(2, 1);
     V grad_a[dim], Pi_a[dim], internal = 0, dissipation[dim];
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
-        grad_a[j] = own(2 + j, 1);
-        Pi_a[j] = own(2 + dim + j, -1);
+        grad_a[j] = own(3 + j, 1);
+        Pi_a[j] = own(3 + dim + j, -1);
         dissipation[j] = 0;
     }}
     auto eight = [&](const int* b, V w) __attribute__((always_inline)) {{
-        V xi[4], jump[4], X[4], J[4];
+        V xi[4], now[4], jump[4], X[4], N[4], J[4];
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
             const Q* const B = all + (size_t)b[i] * vectors;
             const Q* const C = all + (size_t)b[i + 4] * vectors;
             xi[i] = nearest(both(B[0], C[0]) - x_a);
+            now[i] = nearest(both(B[2], C[2]) - now_a);
             jump[i] = both(B[1], C[1]) - v_a;
             #pragma unroll
-            for (int j = 0; j < dim; ++j) jump[i] += (grad_a[j] + both(B[2 + j], C[2 + j])) * spread(xi[i], j);
+            for (int j = 0; j < dim; ++j) jump[i] += (grad_a[j] + both(B[3 + j], C[3 + j])) * spread(xi[i], j);
         }}
         turn(xi, X);
+        turn(now, N);
         turn(jump, J);
-        V rr = X[0] * X[0], along = X[0] * J[0];
+        V rr = X[0] * X[0], nn = N[0] * N[0], along = N[0] * J[0];
         #pragma unroll
         for (int j = 1; j < dim; ++j) {{
             rr += X[j] * X[j];
-            along += X[j] * J[j];
+            nn += N[j] * N[j];
+            along += N[j] * J[j];
         }}
-        rr = rr > 0 ? rr : (V)1;
-        const V r = __builtin_elementwise_sqrt(rr), Z = X[3], Z_shear = J[3];
-        const V normal = along * (Z - Z_shear) * (w / r), shear = Z_shear * (w * r);
+        nn = nn > 0 ? nn : (V)1;
+        const V wr = w * __builtin_elementwise_sqrt(rr), Z = X[3], Z_shear = J[3];
+        const V normal = along * (Z - Z_shear) * (wr / nn), shear = Z_shear * wr;
         #pragma unroll
-        for (int j = 0; j < dim; ++j) dissipation[j] += X[j] * normal + J[j] * shear;
+        for (int j = 0; j < dim; ++j) dissipation[j] += N[j] * normal + J[j] * shear;
         // apart, so that few vectors are alive at a time: the stack is not aligned to them, spills cost up to a half
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
@@ -108,7 +113,7 @@ def _make_forces(space: Space) -> Any:
             V force = 0;
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
-                const V P = Pi_a[j] + both(B[2 + dim + j], C[2 + dim + j]);
+                const V P = Pi_a[j] + both(B[3 + dim + j], C[3 + dim + j]);
                 force += P * ({balanced});
             }}
             internal += force * spread(w, i);
@@ -160,10 +165,17 @@ class PairForces:
         self._rows = packed_rows(space, n, _vectors(space), device)
 
     def compute(
-        self, configuration: Configuration, flux: Any, v: wp.array, grad_v: wp.array, epsilon: float, forces: Any
+        self,
+        configuration: Configuration,
+        flux: Any,
+        x: wp.array,
+        v: wp.array,
+        grad_v: wp.array,
+        epsilon: float,
+        forces: Any,
     ) -> None:
         """``forces.internal`` (M5) and ``forces.dissipation`` (M9 without a sensor) [N]."""
         n = len(v)
-        self._launch(_make_pack(self.space), n, [configuration.fields, flux, v, grad_v, self._rows])
+        self._launch(_make_pack(self.space), n, [configuration.fields, flux, x, v, grad_v, self._rows])
         arguments = [configuration.fields, configuration.near, self._rows, epsilon]
         self._launch(_make_forces(self.space), n, [*arguments, forces.internal, forces.dissipation])

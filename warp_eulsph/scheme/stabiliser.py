@@ -31,10 +31,11 @@ class Stabiliser(ABC):
         self,
         configuration: Configuration,
         flux: Any,
+        x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
         sensor: wp.array | None,
         forces: Any,
     ) -> None:
-        """Internal force (M5), dissipation (M9, ε, switched by ``sensor``) and correction [N] into ``forces``."""
+        """Internal force (M5), dissipation (M9, ε, switched by ``sensor``, at x and v) and correction [N]."""

@@ -70,6 +70,7 @@ class SurfaceForces(Stabiliser):
         self,
         configuration: Configuration,
         flux: Any,
+        x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
@@ -77,7 +78,7 @@ class SurfaceForces(Stabiliser):
         forces: Any,
     ) -> None:
         """Internal force (M5), dissipation (M9) and correction (M10) into ``forces``."""
-        self.upwind.compute(configuration, flux, v, grad_v, epsilon, sensor, forces)
+        self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
         arguments = [flux.Q, self.defect, forces.correction]
         wp.launch(_make_correction(self.space), len(v), arguments, device=self.device)
         if self.projection is not None:

@@ -28,15 +28,16 @@ class Tie:
     Args:
         stiffness: χ, over Ē, the modulus of pressure waves M or 4μ, whichever is less: M where Poisson's ratio is ⅓.
             Beyond that volume would resist what the tie is to hold, and coarse bodies lock. At 1 it raises the highest
-            frequency of a body, and so the cost of a run, by less than a tenth (``tests/test_tie.py``).
+            frequency of a body, and so the cost of a run, by less than a tenth (``tests/test_tie.py``); stiffer ties
+            make coarse bodies stiffer, and their F worse near edges (docs/method.md, §10).
     """
 
-    stiffness: float = 1.0
+    stiffness: float = 0.5
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.stiffness) and 0.0 < self.stiffness <= 1.0):
             raise ValueError(
-                f"tie stiffness must be in (0, 1], got {self.stiffness}; 1 is the tested value, tie=None has none"
+                f"tie stiffness must be in (0, 1], got {self.stiffness}; 0.5 is the tested value, tie=None has none"
             )
 
     def build(self, space: Space, flux: Flux, moving: list[bool], device: Any) -> "TiedPairs | None":

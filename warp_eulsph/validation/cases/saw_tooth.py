@@ -35,8 +35,8 @@ PLAIN = Verlet(dissipation=None, correction=None)
 STRAINS = (-0.1, -0.03, 0.03, 0.1)
 SCHEMES = {
     "total Lagrangian": (Never(), Verlet()),
-    "Eulerian, default": (Always(), Verlet()),
-    "Eulerian, M11": (Always(), Verlet(correction=CLOSED)),
+    "current, M13": (Always(), Verlet()),
+    "current, M11": (Always(), Verlet(correction=CLOSED)),
 }
 
 
