@@ -14,7 +14,7 @@ from warp_eulsph.linalg import (
     stretch_of_volume,
     symmetric_bounds,
 )
-from warp_eulsph.scheme.lax_wendroff import moved_surface
+from warp_eulsph.scheme.updates import moved_surface
 
 SPACES = [Space(dim, real) for dim in (1, 2, 3) for real in (wp.float32, wp.float64)]
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from .checks import real_array, spread
 from .materials import Material
 
 
@@ -24,7 +25,9 @@ class Body:
         name: for boundary conditions and output.
 
     Raises:
-        ValueError: wrong shapes, non-finite values, volumes or spacings that are not positive.
+        ValueError: wrong shapes, entries that are not finite real numbers, volumes or spacings that are not positive.
+
+    Arrays are kept as copies that are read-only; ``dataclasses.replace`` makes a body with others.
     """
 
     x: np.ndarray
@@ -36,36 +39,46 @@ class Body:
     name: str = "body"
 
     def __post_init__(self) -> None:
-        x = np.array(self.x, dtype=float)
+        if not isinstance(self.name, str) or not self.name:
+            raise ValueError(f"name of a body must be text, got {self.name!r}")
+        if not isinstance(self.material, Material):
+            given = f"the class {self.material.__name__}" if isinstance(self.material, type) else repr(self.material)
+            raise ValueError(
+                f"body {self.name!r}: material must be a law such as NeoHookean(density=1100.0, young=17e6, "
+                f"poisson=0.45), got {given}"
+            )
+        x = real_array(self.x, f"body {self.name!r}: x", finite=False)
+        if x.ndim == 1 and x.size:
+            raise ValueError(f"body {self.name!r}: x must have shape (n, dim), got {x.shape}; in 1-D give x[:, None]")
         if x.ndim != 2 or x.shape[0] == 0 or x.shape[1] not in (1, 2, 3):
             raise ValueError(f"body {self.name!r}: x must have shape (n, 1), (n, 2) or (n, 3), got {x.shape}")
-        object.__setattr__(self, "x", x)
-        self._field("x", x, x.shape)
-        object.__setattr__(self, "volume", self._field("volume", self.volume, (len(x),), positive=True))
+        self._keep("x", self._field("x", x, x.shape))
+        self._keep("volume", self._field("volume", self.volume, (len(x),), positive=True))
         spacing = self.volume ** (1.0 / x.shape[1]) if self.spacing is None else self.spacing
-        object.__setattr__(self, "spacing", self._field("spacing", spacing, (len(x),), positive=True))
-        object.__setattr__(self, "velocity", self._field("velocity", self.velocity, x.shape))
+        self._keep("spacing", self._field("spacing", spacing, (len(x),), positive=True))
+        self._keep("velocity", self._field("velocity", self.velocity, x.shape))
         if self.surface is not None:
-            object.__setattr__(self, "surface", self._field("surface", self.surface, x.shape))
+            self._keep("surface", self._field("surface", self.surface, x.shape))
+
+    def _keep(self, name: str, values: np.ndarray) -> None:
+        """A copy that nobody changes by accident."""
+        kept = np.array(values)
+        kept.setflags(write=False)
+        object.__setattr__(self, name, kept)
 
     def _field(self, name: str, given: Any, shape: tuple[int, ...], positive: bool = False) -> np.ndarray:
-        values = np.asarray(given, dtype=float)
-        try:
-            values = np.broadcast_to(values, shape)
-        except ValueError:
-            raise ValueError(
-                f"body {self.name!r}: {name} must be a number or have shape {shape}, got {values.shape}"
-            ) from None
+        who = f"body {self.name!r}: {name}"
+        values = spread(real_array(given, who, finite=False), shape, who)
         wrong = ~np.isfinite(values)
         if positive:
             wrong |= values <= 0.0
         if wrong.any():
             first = np.argwhere(wrong)[0]
             raise ValueError(
-                f"body {self.name!r}: {name} must be {'positive and ' if positive else ''}finite, "
+                f"{who} must be {'positive and ' if positive else ''}finite, "
                 f"got {values[tuple(first)]} at particle {first[0]} ({wrong.sum()} such values)"
             )
-        return values.copy()
+        return values
 
 
 def checked_bodies(bodies: list[Body]) -> list[Body]:

@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .arguments import check_options, warn
 from .body import Body, checked_bodies
 from .boundaries import Assembly, Boundary
+from .checks import check_restorable, checked_box, objects, real_number
 from .diagnostics import Diagnostics
 from .execution import graphs
+from .failure import failure, where
 from .fields import allocate
 from .memory import check_memory
 from .order import Order
@@ -17,7 +20,6 @@ from .schedule import AtTimes, EveryTime, targets
 from .scheme.arrangement import Arrangement, Convected
 from .scheme.flux import Flux, check_reference
 from .scheme.graphs import StepGraphs, recordable
-from .scheme.health import UnstableError, last_good
 from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff, is_corrected
 from .scheme.reference import Always, Configuration, Never, ReferencePolicy
@@ -26,11 +28,10 @@ from .scheme.verlet import Verlet
 from .sorting import Sorting
 from .space import Space
 from .weights import CubicSpline, Weight
+from .whole import Whole
 
 # Steps by graphs between two looks at the clock; graphs past the target or past a failure do nothing.
 STEPS_BETWEEN_LOOKS = 8
-# A time step that fell below this share of the longest one means neighbourhoods that collapsed: the run would not end.
-STALLED = 1e-6
 
 
 class Simulation:
@@ -73,20 +74,21 @@ class Simulation:
         device: Any = None,
         sort: bool = True,
     ):
-        self.bodies = checked_bodies([bodies] if isinstance(bodies, Body) else list(bodies))
+        self.bodies = checked_bodies(objects(bodies, Body, "bodies", "Body(...)"))
+        check_options(reference, arrangement, scheme, time_step, weight, dtype)
         X = np.concatenate([body.x for body in self.bodies])
         self.space = Space(X.shape[1], dtype, periodic is not None)
         self.device = wp.get_device(device)
-        self.boundaries = tuple(boundaries)
+        self.boundaries = tuple(objects(boundaries, Boundary, "boundaries", "Fixed(lambda X: X[:, 0] < 0.1)"))
         self.reference, self.arrangement = reference, arrangement
         check_reference([body.material for body in self.bodies], reference)
         moving = [not reference.fixed and arrangement.moves(body.material) for body in self.bodies]
         if not any(moving):
             reference = Never()
-        if not (np.isfinite(dilation) and dilation > 0.0):
+        if not (np.isfinite(real_number(dilation, "dilation")) and dilation > 0.0):
             raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
         self.dilation = dilation
-        box = _checked_box(periodic, self.space.dim)
+        box = checked_box(periodic, self.space.dim)
         check_memory(self.space, len(X), weight.support * dilation, not reference.fixed, self.device)
         counts = [len(body.x) for body in self.bodies]
         ends = np.cumsum([0, *counts])
@@ -96,6 +98,7 @@ class Simulation:
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
         materials = [(body.material, len(body.x)) for body in self.bodies]
+        warn(self.bodies, self.particles.share.numpy() == 0.0, box, self.space.real)
         flux = Flux(self.space, materials, self.particles, self.device)
         surface_given = self.bodies[0].surface is not None
         corrected = is_corrected(scheme, reference, surface_given)
@@ -127,6 +130,7 @@ class Simulation:
         self._graphs: StepGraphs | None = None
         self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
+        self.whole = Whole()
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
 
     # what a run does
@@ -142,9 +146,11 @@ class Simulation:
 
         Raises:
             UnstableError: det F ≤ 0 or non-finite values; the last good frame stays on disk.
+            BrokenError: an exception left an earlier step half done.
             OSError: the directory cannot be written.
         """
-        if not (np.isfinite(until) and until >= self.t):
+        self.whole.check()
+        if not (np.isfinite(real_number(until, "until")) and until >= self.t):
             raise ValueError(f"until must be finite and not before the present time {self.t} s, got {until}")
         frames = AtTimes() if every is None else EveryTime(every, self.t)
         if output is None:
@@ -177,6 +183,7 @@ class Simulation:
 
         Raises:
             UnstableError: det F ≤ 0 or non-finite values.
+            BrokenError: an exception left an earlier step half done.
         """
         self.clock.aim(until)
         self._take_steps(most)
@@ -187,13 +194,18 @@ class Simulation:
             self._take_steps(None)
 
     def _take_steps(self, most: int | None) -> None:
-        if self._graphs is None:
-            self.stepper.step()
-        else:
-            limits = (STEPS_BETWEEN_LOOKS, most, self.sorting.steps_left(self.steps))
-            self._graphs.take(min(limit for limit in limits if limit is not None))
-        self._raise_if_bad()
-        self.sorting.look_after(self.steps)
+        self.whole.check()
+        with self.whole:
+            if self._graphs is None:
+                self.stepper.step()
+            else:
+                limits = (STEPS_BETWEEN_LOOKS, most, self.sorting.steps_left(self.steps))
+                self._graphs.take(min(limit for limit in limits if limit is not None))
+            unstable = failure(self)
+            if unstable is None:
+                self.sorting.look_after(self.steps)
+        if unstable is not None:
+            raise unstable
 
     # what a checkpoint holds
 
@@ -213,13 +225,17 @@ class Simulation:
             ValueError: names or shapes that are not those of this simulation; nothing was changed.
         """
         check_restorable(self, arrays, counters)
-        self.order.rearrange(arrays["Order.ids"])
-        for name, array in self.evolving().items():
-            array.assign(arrays[name])
-        self.stepper.steps = int(counters["steps"])
-        self.stepper.ledger.start = counters["start"]
-        self.clock.fields.longest_dt.fill_(counters["longest_dt"])
-        self.stepper.rebuild()
+        with self.whole:
+            self.order.rearrange(arrays["Order.ids"])
+            for name, array in self.evolving().items():
+                array.assign(arrays[name])
+            self.stepper.steps = int(counters["steps"])
+            self.stepper.ledger.start = counters["start"]
+            self.clock.fields.longest_dt.fill_(counters["longest_dt"])
+            self.stepper.rebuild()
+            if self._graphs is not None and self.whole.broken is not None:
+                self._graphs = StepGraphs(self.stepper)  # what broke in may have cut a recording short
+        self.whole.mend()
 
     # what a user looks at
 
@@ -347,62 +363,14 @@ class Simulation:
         if close.size:
             raise ValueError(
                 f"particles of a body must not coincide, got {close.size} with a neighbour closer than 1e-6 spacings; "
-                f"the first is particle {close[0]} {self._where(close[0], X)}; remove duplicates"
+                f"the first is particle {close[0]} {where(self, close[0], X)}; remove duplicates"
             )
         poor = np.flatnonzero(configuration.poor.numpy())
         if poor.size:
             neighbours = np.diff(configuration.near.start.numpy())[poor[0]]
             raise ValueError(
                 f"the neighbours of a particle must span all {self.space.dim} directions, {poor.size} particles lack "
-                f"some; the first is particle {poor[0]} {self._where(poor[0], X)} with {neighbours} neighbours within "
+                f"some; the first is particle {poor[0]} {where(self, poor[0], X)} with {neighbours} neighbours within "
                 f"h = {self.particles.h.numpy()[poor[0]]:.6g} m times {configuration.weight.support}; "
                 "increase dilation, check spacing, or use at least 2 particles across each direction"
             )
-
-    def _where(self, particle: int, x: np.ndarray) -> str:
-        name = next(name for name, indices in self.ranges.items() if particle in indices)
-        return f"of body {name!r} at x = {np.array2string(x[particle], precision=6)} m"
-
-    def _raise_if_bad(self) -> None:
-        place, dt = self.clock.bad, self.clock.free_dt
-        if place is not None:
-            particle = int(self.order.ids.numpy()[place])
-            x, v, F = self.x[particle], self.v[particle], self.F[particle]
-            if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
-                what = f"det F = {np.linalg.det(F):.4g}, must be positive"
-            else:
-                what = f"non-finite values, v = {v}, F = {F.tolist()}"
-        elif dt < STALLED * self.clock.longest_dt:
-            particle = int(self.order.by_number(self.stepper.flux.fields.speed.numpy()).argmax())
-            what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
-        else:
-            return
-        raise UnstableError(
-            f"unstable at t = {self.t:.8g} s, step {self.steps}: particle {particle} "
-            f"{self._where(particle, self.x)} has {what}; {last_good(self.output)}; "
-            "try a smaller cfl, a finer resolution, a limiter, or a moving reference",
-            particle,
-            self.t,
-            self.steps,
-        )
-
-
-def check_restorable(simulation: Any, arrays: Mapping[str, np.ndarray], counters: Mapping[str, float]) -> None:
-    """ValueError unless names and shapes are those of ``evolving`` and ``counters`` of this ``simulation``."""
-    shapes = {name: array.numpy().shape for name, array in simulation.evolving().items()}
-    given = {name: array.shape for name, array in arrays.items()}
-    wrong = sorted(name for name in shapes.keys() | given.keys() if shapes.get(name) != given.get(name))
-    if wrong or counters.keys() != simulation.counters.keys():
-        raise ValueError(
-            f"restore: arrays must have names and shapes of this simulation, {wrong[0] if wrong else 'counters'} "
-            f"differs: {given.get(wrong[0]) if wrong else set(counters)}; build the simulation as it was"
-        )
-
-
-def _checked_box(periodic: Sequence[float] | None, dim: int) -> tuple[float, ...]:
-    if periodic is None:
-        return (0.0,) * dim
-    box = tuple(float(length) for length in periodic)
-    if len(box) != dim or not all(np.isfinite(length) and length >= 0.0 for length in box):
-        raise ValueError(f"periodic must be {dim} lengths [m], 0 where the box is open, got {periodic}")
-    return box

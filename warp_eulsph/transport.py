@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .checks import check_restorable
 from .order import Order
 from .schedule import SAME
 from .scheme.health import UnstableError, last_good
 from .scheme.reference import Configuration
 from .scheme.scalar import ConservationLaw
-from .simulation import STEPS_BETWEEN_LOOKS, check_restorable
+from .simulation import STEPS_BETWEEN_LOOKS
+from .whole import Whole
 
 # Values that grew to so many times the largest at the start: nothing that is only carried along does that.
 GROWN = 100.0
@@ -48,6 +50,7 @@ class Transport:
         self.order = Order(len(law.U), self.device)  # particles stay where they are, in memory too
         self.steps, self.dt = 0, 0.0
         self._most = GROWN * float(np.abs(law.start).max()) or np.inf
+        self.whole = Whole()
         self.output: Any = None
 
     def advance(self, until: float, most: int | None = None) -> None:
@@ -55,7 +58,9 @@ class Transport:
 
         Raises:
             UnstableError: values that are not finite, or a hundred times as large as at the start.
+            BrokenError: an exception left an earlier step half done.
         """
+        self.whole.check()
         batch = STEPS_BETWEEN_LOOKS if self.device.is_cuda else 1
         before = self.t
         for _ in range(batch if most is None else min(batch, most)):
@@ -64,10 +69,11 @@ class Transport:
                 break
             # What is left beyond the step by less than SAME of it is rounding, not another step
             last = left <= self.time_step * (1.0 + SAME)
-            self.dt = left if last else self.time_step
-            self.law.step(self.dt)
-            self.law.t = until if last else self.law.t
-            self.steps += 1
+            with self.whole:
+                self.dt = left if last else self.time_step
+                self.law.step(self.dt)
+                self.law.t = until if last else self.law.t
+                self.steps += 1
         self._raise_if_bad(before)
 
     # what a checkpoint holds
@@ -88,8 +94,10 @@ class Transport:
             ValueError: names or shapes that are not those of this one; nothing was changed.
         """
         check_restorable(self, arrays, counters)
-        self.law.U.assign(arrays["U"])
-        self.steps, self.law.t, self.dt = int(counters["steps"]), float(counters["t"]), float(counters["dt"])
+        with self.whole:
+            self.law.U.assign(arrays["U"])
+            self.steps, self.law.t, self.dt = int(counters["steps"]), float(counters["t"]), float(counters["dt"])
+        self.whole.mend()
 
     # what a user looks at
 

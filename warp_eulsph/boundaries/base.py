@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..checks import real_array
 from ..order import Order
 from ..space import Space
 
-#: A predicate of initial positions (n, dim) -> (n,) bool, a boolean mask (n,), or an array of indices.
+#: A predicate of initial positions (n, dim) -> (n,) bool, a boolean mask (n,), or an array of indices; rows of values
+#: are for the particles in its order.
 Region = Callable[[np.ndarray], np.ndarray] | np.ndarray | Sequence[int]
 
 
@@ -36,7 +38,7 @@ class Assembly:
     order: Order
 
     def select(self, region: Region | None, body: str | None, who: str) -> np.ndarray:
-        """Sorted indices of the region's particles, (k,) int32.
+        """Indices of the region's particles, each once, (k,) int32: as given, ascending for masks and functions.
 
         Raises:
             ValueError: unknown body, wrong shape, indices out of range, or nothing selected.
@@ -44,39 +46,59 @@ class Assembly:
         n = len(self.X)
         if body is not None and body not in self.bodies:
             raise ValueError(f"{who}: body must be one of {sorted(self.bodies)}, got {body!r}")
-        chosen = np.zeros(n, dtype=bool)
         if region is None:
-            chosen[:] = True
+            chosen = np.arange(n)
         elif callable(region):
-            mask = np.asarray(region(self.X))
-            if mask.shape != (n,) or mask.dtype != bool:
-                raise ValueError(
-                    f"{who}: a region predicate must return ({n},) bool for positions of shape {self.X.shape}, "
-                    f"got {mask.shape} {mask.dtype}; write for example lambda X: X[:, 0] < 0.1"
-                )
-            chosen |= mask
+            chosen = np.flatnonzero(_mask(region(read_only(self.X)), self.X, who))
         else:
-            indices = np.asarray(region)
-            if indices.dtype == bool:
-                if indices.shape != (n,):
-                    raise ValueError(f"{who}: a region mask must have shape ({n},), got {indices.shape}")
-            elif indices.size and (
-                not np.issubdtype(indices.dtype, np.integer) or indices.min() < 0 or indices.max() >= n
-            ):
-                raise ValueError(f"{who}: region indices must be integers in [0, {n}), got {indices}")
-            chosen[indices if indices.size else slice(0)] = True
+            chosen = _indices(region, n, who)
         if body is not None:
-            outside = np.ones(n, dtype=bool)
-            outside[self.bodies[body]] = False
-            chosen &= ~outside
-        selected = np.flatnonzero(chosen).astype(np.int32)
-        if selected.size == 0:
+            of_body = self.bodies[body]
+            chosen = chosen[(chosen >= of_body.start) & (chosen < of_body.stop)]
+        if chosen.size == 0:
             low, high = self.X.min(axis=0), self.X.max(axis=0)
             raise ValueError(
                 f"{who}: the region selects no particle; positions lie in {low} to {high} m, "
                 f"bodies are {sorted(self.bodies)}"
             )
-        return selected
+        return chosen.astype(np.int32)
+
+
+def read_only(values: np.ndarray) -> np.ndarray:
+    """A copy for a user's function, which can change neither it nor what it was made of."""
+    copy = np.array(values)
+    copy.setflags(write=False)
+    return copy
+
+
+def _mask(given: Any, X: np.ndarray, who: str) -> np.ndarray:
+    """What a predicate said of positions X, (n,) bool."""
+    mask = np.asarray(given)
+    if mask.shape != (len(X),) or mask.dtype != bool or isinstance(given, np.ma.MaskedArray):
+        raise ValueError(
+            f"{who}: a region predicate must return ({len(X)},) bool for positions of shape {X.shape}, "
+            f"got {mask.shape} {mask.dtype}; write for example lambda X: X[:, 0] < 0.1"
+        )
+    return mask
+
+
+def _indices(given: Any, n: int, who: str) -> np.ndarray:
+    """Indices as given, each once where it came first; those of a mask."""
+    indices = np.asarray(given)
+    if isinstance(given, np.ma.MaskedArray):
+        raise ValueError(f"{who}: a region must not be a masked array, whose masked entries would count")
+    if indices.dtype == bool:
+        if indices.shape != (n,):
+            raise ValueError(f"{who}: a region mask must have shape ({n},), got {indices.shape}")
+        return np.flatnonzero(indices)
+    if indices.size and (not np.issubdtype(indices.dtype, np.integer) or indices.min() < 0 or indices.max() >= n):
+        raise ValueError(f"{who}: region indices must be integers in [0, {n}), got {indices}")
+    if indices.ndim != 1:
+        raise ValueError(f"{who}: region indices must have shape (k,), got {indices.shape}")
+    _, first = np.unique(indices, return_index=True)
+    if n == len(indices) > len(first) and indices.max() <= 1:
+        raise ValueError(f"{who}: a region mask must be of type bool, got {n} integers 0 and 1; use .astype(bool)")
+    return indices[np.sort(first)]
 
 
 class Boundary(ABC):
@@ -134,7 +156,7 @@ def unit_vector(given: Sequence[float], dim: int, who: str) -> np.ndarray:
     Raises:
         ValueError: wrong shape, zero or not finite.
     """
-    vector = np.asarray(given, dtype=float)
+    vector = real_array(given, f"{who}: normal", finite=False)
     if vector.shape != (dim,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0.0:
         raise ValueError(f"{who}: normal must be ({dim},) finite numbers, not all zero, got {given}")
     return vector / np.linalg.norm(vector)

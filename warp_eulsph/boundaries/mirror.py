@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
+from ..checks import real_array
 from ..fields import structure
 from ..space import Space
 from .base import Assembly, Bound, Boundary, unit_vector
@@ -81,7 +82,7 @@ def mirror(
         ValueError: particles on or behind the plane, none within ``depth``, or Antisymmetry without a linear law.
     """
     dim = body.x.shape[1]
-    n, p = unit_vector(normal, dim, "mirror"), np.asarray(point, dtype=float)
+    n, p = unit_vector(normal, dim, "mirror"), real_array(point, "mirror: point")
     if p.shape != (dim,) or not np.isfinite(p).all():
         raise ValueError(f"mirror: point must be ({dim},) finite numbers, got {point}")
     if image.odd and not body.material.linear:

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..checks import real_array, spread
 from ..fields import clock_structure
 from ..space import Space
-from .base import Assembly
+from .base import Assembly, read_only
 
 
 @functools.cache
@@ -41,7 +42,8 @@ class Value:
         assembly: the particles.
         indices: numbers of those it is for, (k,).
         components: reals in a row.
-        given: a number or (components,) for all; (k, components), or (k,) when components is 1, one each; a
+        given: a number or (components,) for all; (k, components), or (k,) when components is 1, one each, in the order
+            of ``indices``, which is that of the region's own; a
             ``wp.func`` (x, t) -> row, evaluated on the device; or a Python function (x (k, dim), t) -> any of these
             shapes, evaluated on the host each step (slower: it reads the device).
         who: named in errors.
@@ -57,7 +59,9 @@ class Value:
         if self.function is None:
             self.rows.assign(self._broadcast(given))
         elif not self.on_device:
-            self._broadcast(given(assembly.X[indices], 0.0))  # a wrong function fails now, not in the first step
+            self._broadcast(
+                given(read_only(assembly.X[indices]), 0.0)
+            )  # a wrong function fails now, not in the first step
 
     @property
     def recordable(self) -> bool:
@@ -71,20 +75,11 @@ class Value:
             wp.launch(kernel, len(self.places), [self.places, x, clock, fraction, self.rows], device=self.device)
         elif self.function is not None:
             t = float(clock.t.numpy()[0]) + fraction * float(clock.dt.numpy()[0])
-            self.rows.assign(self._broadcast(self.function(x.numpy()[self.places.numpy()], t)))
+            self.rows.assign(self._broadcast(self.function(read_only(x.numpy()[self.places.numpy()]), t)))
         return self.rows
 
     def _broadcast(self, given: Any) -> np.ndarray:
-        count = self.count
-        values = np.asarray(given, dtype=self.space.numpy)
-        if not np.isfinite(values).all():
-            raise ValueError(f"{self.who}: values must be finite, got {given}")
-        if self.components == 1 and values.ndim == 1 and len(values) == count:
+        values = real_array(given, f"{self.who}: values", self.space.numpy)
+        if self.components == 1 and values.shape == (self.count,):
             values = values[:, None]
-        try:
-            return np.ascontiguousarray(np.broadcast_to(values, (count, self.components)))
-        except ValueError:
-            raise ValueError(
-                f"{self.who}: values must be a number, ({self.components},) or ({count}, {self.components}), "
-                f"got shape {values.shape}"
-            ) from None
+        return np.ascontiguousarray(spread(values, (self.count, self.components), f"{self.who}: values"))

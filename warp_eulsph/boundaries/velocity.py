@@ -1,8 +1,9 @@
 """Prescribed velocities."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import warp as wp
@@ -59,8 +60,11 @@ class BoundVelocity(Bound):
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
         self.recordable = self.values.recordable
         axes = range(self.space.dim) if condition.axes is None else condition.axes
-        if not set(axes) <= set(range(self.space.dim)) or len(list(axes)) == 0:
-            raise ValueError(f"{who}: axes must be among {list(range(self.space.dim))}, got {condition.axes}")
+        known = range(self.space.dim)
+        if not isinstance(axes, Iterable):
+            raise ValueError(f"{who}: axes must be a list among {list(known)}, got {axes!r}; write axes=[{axes}]")
+        if not all(isinstance(axis, Integral) and axis in known for axis in axes) or len(list(axes)) == 0:
+            raise ValueError(f"{who}: axes must be among {list(known)}, got {condition.axes}")
         self.axes = wp.vec3i(*[int(i in axes) for i in range(3)])
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ..boundaries import Boundary, mirror
@@ -60,8 +61,8 @@ class BodyTable(Table):
             volume=volume if self.volume is None else self.volume.at(x)[:, 0],
             spacing=None if self.spacing is None else self.spacing.at(x)[:, 0],
             material=self.material.make(),
-            velocity=self.velocity.at(x),
-            surface=surface if self.surface is None else self.surface.at(x),
+            velocity=np.broadcast_to(self.velocity.at(x), x.shape),  # one part is for all components
+            surface=surface if self.surface is None else np.broadcast_to(self.surface.at(x), x.shape),
             name=name,
         )
 

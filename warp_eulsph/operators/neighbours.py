@@ -18,6 +18,8 @@ log = logging.getLogger(__name__)
 
 # Cell coordinates are rounded, distances are tested exactly: a query a little too wide misses nothing.
 QUERY_MARGIN = 1.001
+# Pairs are numbered by 32-bit integers.
+MOST_PAIRS = 2**31 - 1
 
 
 @functools.cache
@@ -137,7 +139,7 @@ def _make_check_room(space: Space) -> Any:
         running: wp.array(dtype=wp.int32),
         waiting: wp.array(dtype=wp.int32),
     ):
-        fits = total[0] <= capacity
+        fits = total[0] >= 0 and total[0] <= capacity  # below 0 the sum ran over
         for i in range(wp.static(dim if space.periodic else 0)):
             fits = fits and (box[i] == real(0.0) or box[i] >= real(2.0) * support * h_max[0])
         if running[0] != 0 and not fits:
@@ -202,8 +204,15 @@ class NeighbourLists:
 
     @property
     def pairs(self) -> int:
-        """Directed pairs (a, b) in the lists; reads the device."""
-        return int(self._total.numpy()[0])
+        """Directed pairs (a, b) in the lists; reads the device.
+
+        Raises:
+            ValueError: more than can be numbered.
+        """
+        pairs = int(self._total.numpy()[0])
+        if pairs < 0:  # the sum of the counts ran over
+            raise ValueError(self._too_many(2.0**31))
+        return pairs
 
     @property
     def waiting(self) -> bool:
@@ -255,10 +264,12 @@ class NeighbourLists:
         """Grow the lists if the rows need it; reads the device.
 
         Raises:
-            ValueError: a periodic box shorter than twice the support radius.
+            ValueError: a periodic box shorter than twice the support radius, or more pairs than can be numbered.
         """
         self._measure()
-        pairs = self.pairs
+        pairs = int(self.count.numpy()[:-1].sum(dtype=np.int64))  # exactly: the sum on the device may have run over
+        if pairs > MOST_PAIRS:
+            raise ValueError(self._too_many(pairs))
         # Exactly what the first configuration needs, which may be the only one; from the second on a quarter more than
         # needed, so that a moving reference grows its lists seldom.
         if pairs > self.capacity or self._builds == 1:
@@ -266,6 +277,12 @@ class NeighbourLists:
             log.debug("neighbour lists grew to %d pairs", self.capacity)
         self._waiting.zero_()
         self._builds += 1
+
+    def _too_many(self, pairs: float) -> str:
+        return (
+            f"neighbour lists number at most {MOST_PAIRS} pairs, {len(self.h)} particles have {pairs:.4g} or more; use "
+            "fewer particles or a smaller dilation"
+        )
 
     def fill(self, x: wp.array) -> None:
         """Write the rows, for which there is room."""

@@ -49,7 +49,8 @@ class Checkpoint:
 
 
 def take(simulation: Recorded, description: Mapping[str, Any], environment: Mapping[str, Any]) -> Checkpoint:
-    """The present state, copied to the host."""
+    """The present state, copied to the host; BrokenError where that is the middle of a step."""
+    simulation.whole.check()
     arrays = {name: np.array(array.numpy()) for name, array in simulation.evolving().items()}
     counters = simulation.counters
     return Checkpoint(simulation.t, simulation.steps, counters, arrays, dict(description), dict(environment))

@@ -88,6 +88,7 @@ def record(
         FileExistsError: a run is there, and neither ``resume`` nor ``replace`` is set.
         ChangedCaseError: the case has changed since the checkpoint; it names the changes.
         DamagedError: no checkpoint is whole.
+        BrokenError: the simulation was left in the middle of a step, and is not put where a checkpoint was.
         UnstableError: see ``Simulation.run`` and ``Transport.advance``; the last checkpoint and snapshot stay.
         OSError: the disk refused; all that was written before is whole, and the run can be resumed.
         ValueError: ``until`` is before the present time, a probe looks at what is not there, or a wrong region.
@@ -95,6 +96,8 @@ def record(
     home = RunDirectory(directory)
     with home.locked():
         checkpoint = Checkpoints(home.checkpoints).newest() if resume else None
+        if checkpoint is None:
+            simulation.whole.check()  # before anything moves
         present = simulation.t if checkpoint is None else checkpoint.time
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")

@@ -54,7 +54,7 @@ class Recording:
             raise ValueError(f"checkpoint must be a positive wall time [s], got {self.checkpoint}; 600 is 10 minutes")
 
     def particles(self, simulation: Recorded) -> np.ndarray | None:
-        """Numbers of the particles that snapshots hold, (k,) int32; None if all.
+        """Numbers of the particles that snapshots hold, (k,) int32, ascending; None if all.
 
         Raises:
             ValueError: unknown body, a region of wrong shape, or nothing selected.
@@ -63,7 +63,7 @@ class Recording:
             return None
         space, device, particles = simulation.space, simulation.device, simulation.particles
         assembly = Assembly(space, device, simulation.X, particles, simulation.ranges, simulation.order)
-        return assembly.select(self.region, self.body, "Recording")
+        return np.sort(assembly.select(self.region, self.body, "Recording"))
 
     @property
     def schedule(self) -> Schedule:

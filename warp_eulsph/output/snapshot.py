@@ -90,6 +90,7 @@ def collect(
 
     ``copies`` makes the copies, which may be on their way then; without it all is there.
     """
+    simulation.whole.check()
     fields, places = chosen_fields(names, simulation), simulation.order.places
     numbers = np.arange(len(places)) if particles is None else particles
     needed = dict.fromkeys(["x", *(source for field in fields.values() for source in field.sources)])

@@ -1,6 +1,5 @@
 """Two-step Lax-Wendroff for {p, F} on a movable reference: the paper's algorithms (§4.3) in one code path (M8)."""
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -9,8 +8,7 @@ import warp as wp
 
 from ..boundaries import Bound
 from ..execution import Launcher
-from ..fields import allocate, arrays, clock_structure, repeated, structure
-from ..linalg import cofactor, det
+from ..fields import allocate, arrays, repeated
 from ..space import Space
 from .balance import Balance
 from .dissipation import Upwind, UpwindForces
@@ -25,6 +23,7 @@ from .smoothing import Smoothing
 from .stabiliser import Stabiliser
 from .tie import Tie, TiedPairs
 from .time_step import DeviceClock
+from .updates import make_drift, make_kick, make_predict
 
 
 @dataclass(frozen=True)
@@ -69,99 +68,6 @@ def check_shifting(shifting: Shifting | None, correction: Any) -> None:
     """Raise ValueError unless the correction has the potentials that shifting follows."""
     if shifting is not None and not isinstance(correction, Balance):
         raise ValueError(f"shifting needs correction=Balance(), whose potentials it follows, got {correction}")
-
-
-@functools.cache
-def moved_surface(space: Space) -> Any:
-    """``wp.func`` Nanson's rule: the area vector s moved from F to F_new, cof(F_new F⁻¹) s, without the inverse."""
-    vec, mat, determinant, cof = space.vec, space.mat, det(space), cofactor(space)
-
-    @wp.func
-    def moved_surface(s: vec, F: mat, F_new: mat) -> vec:
-        return cof(F_new) @ (wp.transpose(F) @ s) / determinant(F)
-
-    return moved_surface
-
-
-@functools.cache
-def _make_predict(space: Space, fixed: bool, surfaces: bool) -> Any:
-    """Kernel: the half step, ``fraction`` = ½, from ``half`` = S(U) (M8); the one-step Lax scheme has 1."""
-    real, mat = space.real, space.mat
-    Particles, State, Forces = structure(space, "Particles"), structure(space, "State"), structure(space, "Forces")
-    Clock, moved = clock_structure(space), moved_surface(space)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def predict(
-        first: int,
-        particles: Particles,
-        state: State,
-        smoothed_F_k: wp.array(dtype=mat),
-        grad_v: wp.array(dtype=mat),
-        forces: Forces,
-        clock: Clock,
-        fraction: wp.float64,
-        half: State,
-    ):
-        a = first + wp.tid()
-        tau = real(fraction * clock.dt[0])
-        force = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a] + forces.external[a]
-        half.v[a] = half.v[a] + force * (tau / particles.mass[a])
-        dF = grad_v[a] * tau
-        if wp.static(not fixed):
-            dF = dF @ smoothed_F_k[a]
-        half.F[a] = half.F[a] + dF
-        half.x[a] = state.x[a] + state.v[a] * tau
-        if wp.static(surfaces):
-            half.surface[a] = moved(state.surface[a], state.F[a], state.F[a] + dF)
-
-    return predict
-
-
-@functools.cache
-def _make_kick(space: Space) -> Any:
-    """Kernel: v^{n+1} (M8)."""
-    real, vec = space.real, space.vec
-    Particles, Forces, Clock = structure(space, "Particles"), structure(space, "Forces"), clock_structure(space)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def kick(first: int, particles: Particles, forces: Forces, clock: Clock, v: wp.array(dtype=vec)):
-        a = first + wp.tid()
-        force = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a] + forces.external[a]
-        v[a] = v[a] + force * (real(clock.dt[0]) / particles.mass[a])
-
-    return kick
-
-
-@functools.cache
-def _make_drift(space: Space, fixed: bool, surfaces: bool) -> Any:
-    """Kernel: F, x and the surface vectors of ``state`` moved by ``fraction`` · Δt with velocity v (M8)."""
-    real, vec, mat = space.real, space.vec, space.mat
-    State, Reference, Clock = structure(space, "State"), structure(space, "Reference"), clock_structure(space)
-    moved = moved_surface(space)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def drift(
-        first: int,
-        reference: Reference,
-        state: State,
-        v: wp.array(dtype=vec),
-        grad_v: wp.array(dtype=mat),
-        clock: Clock,
-        fraction: wp.float64,
-        out: State,
-    ):
-        a = first + wp.tid()
-        tau = real(fraction * clock.dt[0])
-        dF = grad_v[a] * tau
-        if wp.static(not fixed):
-            dF = dF @ reference.F[a]
-        F_new = state.F[a] + dF
-        if wp.static(surfaces):
-            out.surface[a] = moved(state.surface[a], state.F[a], F_new)
-        out.F[a] = F_new
-        out.x[a] = state.x[a] + v[a] * tau
-
-    return drift
 
 
 class LaxWendroffStepper:
@@ -375,16 +281,16 @@ class LaxWendroffStepper:
 
     def _predict(self, U: Any, half: Any, fraction: float) -> None:
         arguments = [self.particles, U, self.smoothed_F_k, self.grad_v, self.forces, self.clock.fields, fraction, half]
-        kernel = _make_predict(self.space, self.configuration.fixed, self.moves_surfaces)
+        kernel = make_predict(self.space, self.configuration.fixed, self.moves_surfaces)
         self._launch(kernel, self.n, arguments)
 
     def _kick(self, U: Any) -> None:
         arguments = [self.particles, self.forces, self.clock.fields, U.v]
-        self._launch(_make_kick(self.space), self.n, arguments)
+        self._launch(make_kick(self.space), self.n, arguments)
 
     def _drift(self, U: Any, v: wp.array, fraction: float, out: Any) -> None:
         arguments = [self.configuration.fields, U, v, self.grad_v, self.clock.fields, fraction, out]
-        kernel = _make_drift(self.space, self.configuration.fixed, self.moves_surfaces)
+        kernel = make_drift(self.space, self.configuration.fixed, self.moves_surfaces)
         self._launch(kernel, self.n, arguments)
 
     def _limit(self, U: Any) -> None:

@@ -208,7 +208,7 @@ class Ledger:
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy = wp.zeros(1, dtype=wp.float64, device=device)
         self._sum_entries, self._sum = SumOfParticles(_Entry, n, device), Sum(wp.float64, n, device)
-        self.start = 0.0
+        self.start, self._most = 0.0, 0.0
 
     def open(self, U: Any) -> None:
         """Start the books at state ``U``."""
@@ -270,6 +270,13 @@ class Ledger:
     def accounts(self) -> dict[str, float]:
         """Energy that each mechanism added since the start [J]; reads the device."""
         return dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+
+    def made(self) -> float:
+        """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""
+        accounts = self.accounts()
+        put_in = abs(self.start) + sum(max(accounts[name], 0.0) for name in ("external", "constraint", "limiter"))
+        self._most = max(self._most, put_in)
+        return max(accounts["stepping"], 0.0) / self._most if self._most > 0.0 else 0.0
 
     def residual(self, U: Any) -> float:
         """Energy that no account explains [J]; round-off if the operators are duals of each other."""

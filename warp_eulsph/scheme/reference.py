@@ -5,6 +5,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
@@ -60,9 +61,10 @@ class Every(ReferencePolicy):
     by_count: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if self.steps < 1:
+        if isinstance(self.steps, bool) or not isinstance(self.steps, Integral) or self.steps < 1:
             raise ValueError(
-                f"steps between refreshes must be at least 1, got {self.steps}; Never() is total Lagrangian"
+                f"steps between refreshes must be a whole number, at least 1, got {self.steps!r}; Never() is total "
+                "Lagrangian"
             )
 
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:

@@ -102,5 +102,5 @@ def _dissipate(simulation: Simulation, v: wp.array) -> np.ndarray:
     forces = allocate(space, "Forces", len(v), simulation.device)
     upwind = UpwindForces(space, simulation.device)
     grad_v = _gradient(simulation, v)
-    upwind.compute(stepper.configuration, stepper.flux.fields, v, grad_v, 1.0, None, forces)
+    upwind.compute(stepper.configuration, stepper.flux.fields, stepper.U.x, v, grad_v, 1.0, None, forces)
     return forces.dissipation.numpy()

@@ -28,7 +28,8 @@ SLOW, FAST = 1.0, 100.0  # 1/s: waves cross the block in 27 ms
 
 def block(dim: int, n: int, jitter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """A unit block of n^dim particles: x [m], volume [m^dim], and who is in the first and in the last layer along x."""
-    x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
+    x, spacings = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
+    volume = np.broadcast_to(spacings, len(x))
     first, last = np.flatnonzero(x[:, 0] < 1.0 / n), np.flatnonzero(x[:, 0] > 1.0 - 1.0 / n)
     return x + jitter / n * np.random.default_rng(0).uniform(-1.0, 1.0, x.shape), volume, first, last
 

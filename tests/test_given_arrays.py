@@ -1,0 +1,277 @@
+"""Arrays that users give go where they say, in every order and shape, or are refused; those they get are read-only."""
+
+import logging
+
+import numpy as np
+import pytest
+import warp as wp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kept_runs import plate
+
+import warp_eulsph as es
+from warp_eulsph.boundaries import Assembly
+from warp_eulsph.geometry import box
+from warp_eulsph.operators.neighbours import MOST_PAIRS
+from warp_eulsph.order import Order
+
+RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
+X = plate().X
+N = len(X)
+
+
+def stepped(*boundaries):
+    simulation = es.Simulation(plate().bodies[0], boundaries=boundaries, reference=es.Never())
+    simulation.step(2)
+    return simulation
+
+
+regions = st.lists(st.integers(0, N - 1), min_size=3, max_size=8, unique=True)
+
+
+@settings(max_examples=15, deadline=None)
+@given(regions)
+def test_rows_of_values_belong_to_the_indices_in_their_order(numbers):
+    rows = np.column_stack([np.array(numbers, dtype=float), -2.0 * np.array(numbers)])
+    simulation = stepped(es.Velocity(region=numbers, value=rows))
+    assert np.array_equal(simulation.v[numbers], rows)
+
+
+CONDITIONS = {
+    "BodyForce": lambda numbers, rows: es.BodyForce(1e3 * rows, region=numbers),
+    "Traction": lambda numbers, rows: es.Traction(1e6 * rows, normal=(1.0, 0.0), region=numbers),
+    "Pressure": lambda numbers, rows: es.Pressure(1e6 * rows[:, 0], region=numbers),
+    "function": lambda numbers, rows: es.BodyForce(lambda x, t: 1e3 * rows, region=numbers),
+    "as a tuple": lambda numbers, rows: es.BodyForce(1e3 * rows, region=tuple(int(i) for i in numbers)),
+}
+
+
+@pytest.mark.parametrize("condition", CONDITIONS.values(), ids=CONDITIONS)
+@settings(max_examples=4, deadline=None)
+@given(regions, st.randoms(use_true_random=False))
+def test_the_order_of_a_region_changes_nothing(condition, numbers, random):
+    rows = np.array([[i + 1.0, 0.5 * i] for i in numbers])
+    shuffled = list(range(len(numbers)))
+    random.shuffle(shuffled)
+    one = stepped(condition(np.array(numbers), rows))
+    other = stepped(condition(np.array(numbers)[shuffled], rows[shuffled]))
+    assert np.array_equal(one.v, other.v) and np.array_equal(one.x, other.x)
+
+
+def test_mirror_ghosts_in_any_order_copy_their_own_source():
+    body, ghosts = es.mirror(plate().bodies[0], point=(0.0, 0.0), normal=(-1.0, 0.0), depth=0.4)
+    order = np.random.default_rng(0).permutation(len(ghosts.ghosts))
+    turned = es.MirrorGhosts(
+        ghosts.body, ghosts.sources[order], ghosts.ghosts[order], ghosts.point, ghosts.normal, ghosts.image
+    )
+    one, other = (es.Simulation(body, boundaries=[condition]) for condition in (ghosts, turned))
+    one.step(3), other.step(3)
+    assert np.array_equal(one.x, other.x)
+
+
+def test_regions_that_cannot_be_meant_are_refused():
+    assembly = Assembly(es.Space(2), wp.get_device("cpu"), X, None, {"plate": range(N)}, Order(N, "cpu"))
+    assert assembly.select([7, 3, 7, 5, 3], None, "who").tolist() == [7, 3, 5]
+    for region, message in [
+        (np.arange(4)[:, None], r"who: region indices must have shape \(k,\), got \(4, 1\)"),
+        (np.ma.array([1, 2], mask=[True, False]), "who: a region must not be a masked array"),
+        ((X[:, 0] < 0.5).astype(np.uint8), "who: a region mask must be of type bool, got 36 integers 0 and 1"),
+        ([1.0, 2.0], r"who: region indices must be integers in \[0, 36\)"),
+        ([-1], r"who: region indices must be integers in \[0, 36\)"),
+        ([], "who: the region selects no particle"),
+        (lambda X: X[:, :1] < 0.5, r"who: a region predicate must return \(36,\) bool"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            assembly.select(region, None, "who")
+
+
+def test_functions_of_users_cannot_move_the_body():
+    def region(X):
+        X -= 0.5
+        return X[:, 0] < -0.4
+
+    with pytest.raises(ValueError, match="read-only"):
+        es.Simulation(plate().bodies[0], boundaries=[es.Fixed(region)])
+
+    def load(x, t):
+        x *= 0.0
+        return x
+
+    with pytest.raises(ValueError, match="read-only"):
+        es.Simulation(plate().bodies[0], boundaries=[es.BodyForce(load)])
+    body = plate().bodies[0]
+    for name in ("x", "volume", "spacing", "velocity"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(body, name)[0] = 1.0
+
+
+def forced(kept):
+    """A user's region that keeps what it was given and writes into it later is given a copy."""
+    return es.Fixed(lambda X: kept.append(X) is None and X[:, 0] < 0.2)
+
+
+def test_what_a_region_keeps_is_a_copy():
+    kept = []
+    simulation = es.Simulation(plate().bodies[0], boundaries=[forced(kept)])
+    kept[0].setflags(write=True)
+    kept[0][:] = 7.0
+    assert np.array_equal(simulation.x, X)
+
+
+def shapes_of(*kinds):
+    return st.sampled_from([tuple({"n": N, "1": 1, "d": 2, "2": 2, "0": 0}[c] for c in kind) for kind in kinds])
+
+
+@settings(max_examples=60, deadline=None)
+@given(shapes_of("", "1", "d", "n", "n1", "nd", "1d", "dn", "1n", "n1d", "nd1", "0", "d1"))
+def test_a_body_takes_numbers_rows_and_one_each_and_nothing_else(shape):
+    rng = np.random.default_rng(1)
+    velocity, volume = rng.normal(size=shape), 1.0 + rng.random(shape)
+    if shape in ((), (2,), (N, 2)):
+        assert np.array_equal(
+            es.Body(x=X, volume=1.0, material=RUBBER, velocity=velocity).velocity, np.broadcast_to(velocity, (N, 2))
+        )
+    else:
+        with pytest.raises(ValueError, match=r"velocity must be a number, \(2,\) or \(36, 2\), got shape"):
+            es.Body(x=X, volume=1.0, material=RUBBER, velocity=velocity)
+    if shape in ((), (N,)):
+        assert np.array_equal(es.Body(x=X, volume=volume, material=RUBBER).volume, np.broadcast_to(volume, N))
+    else:
+        with pytest.raises(ValueError, match=r"volume must be a number or have shape \(36,\), got"):
+            es.Body(x=X, volume=volume, material=RUBBER)
+    given_to_condition = es.Velocity(region=[5, 3, 1], value=velocity)
+    if shape in ((), (2,)):
+        stepped(given_to_condition)
+    else:
+        with pytest.raises(ValueError, match=r"Velocity: values must be a number, \(2,\) or \(3, 2\), got shape"):
+            stepped(given_to_condition)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (np.ma.array(np.ones((N, 2)), mask=X < 0.5), "must not be a masked array"),
+        (np.ones((N, 2)) + 0j, "must be real numbers, got complex numbers"),
+        (X < 0.5, "must be real numbers, got truth values"),
+        (np.full((N, 2), None), "must be real numbers, got objects"),
+        ([[1.0, 2.0], [3.0]], "must be rows of equal length"),
+        ("fast", "must be real numbers"),
+        (np.inf, "must be (positive and )?finite"),
+    ],
+    ids=["masked", "complex", "bool", "object", "ragged", "text", "inf"],
+)
+def test_what_is_not_real_numbers_is_refused_everywhere(given, message):
+    for make in (
+        lambda: es.Body(x=X, volume=1.0, material=RUBBER, velocity=given),
+        lambda: es.Body(x=X, volume=given, material=RUBBER),
+        lambda: es.Body(x=given, volume=1.0, material=RUBBER),
+        lambda: stepped(es.Velocity(value=given)),
+        lambda: stepped(es.BodyForce(lambda x, t: given)),
+        lambda: stepped(es.Roller(None, normal=given)),
+    ):
+        with pytest.raises(ValueError, match=f"{message}|normal must be|x must have shape"):
+            make()
+
+
+def test_wrong_kinds_say_what_to_write():
+    body = plate().bodies[0]
+    for make, message in [
+        (lambda: es.Simulation(body, reference="Always"), r"reference must be such as Always\(\), got str 'Always'"),
+        (lambda: es.Simulation(body, reference=es.Always), r"got the class; write Always\(\.\.\.\)"),
+        (lambda: es.Simulation(body, dtype=np.float32), r"write dtype=wp\.float32"),
+        (lambda: es.Simulation(body, scheme=es.TimeStep()), r"scheme must be such as Verlet\(\), got TimeStep"),
+        (lambda: es.Simulation(body, boundaries=[es.Fixed]), r"boundaries\[0\] must be an object such as Fixed"),
+        (lambda: es.Simulation(body, boundaries=3), r"boundaries must be a list such as \[Fixed"),
+        (lambda: es.Simulation([body, None]), r"bodies\[1\] must be such as Body"),
+        (lambda: es.Simulation(body, dilation="1.3"), "dilation must be a number, got '1.3'"),
+        (lambda: es.Simulation(body, periodic="ab"), "periodic must be real numbers"),
+        (lambda: es.Simulation(body).run(until="1"), "until must be a number, got '1'"),
+        (lambda: es.Simulation(body, boundaries=[es.Fixed(axes=1)]), r"write axes=\[1\]"),
+        (lambda: es.Simulation(body, boundaries=[es.Fixed(axes=[0.5])]), r"axes must be among \[0, 1\]"),
+        (lambda: es.Body(x=X, volume=1.0, material=None), r"material must be a law such as NeoHookean"),
+        (lambda: es.Body(x=X, volume=1.0, material=es.NeoHookean), "got the class NeoHookean"),
+        (lambda: es.Body(x=np.arange(4.0), volume=1.0, material=RUBBER), r"in 1-D give x\[:, None\]"),
+        (lambda: es.Every(1.5), "must be a whole number, at least 1, got 1.5"),
+        (lambda: es.Every(True), "must be a whole number, at least 1, got True"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            make()
+    one, listed = (es.Simulation(body, boundaries=given) for given in (es.Fixed(), [es.Fixed()]))
+    assert len(one.boundaries) == len(listed.boundaries) == 1
+
+
+def block(corner, name, spacing=0.1, dim=2):
+    x, volume = box([0.0] * dim, [1.0] * dim, spacing)
+    return es.Body(x=x + np.array(corner), volume=volume, material=RUBBER, name=name)
+
+
+@pytest.mark.parametrize(
+    ("corner", "other", "periodic", "counts"),
+    [
+        ((1.0, 0.0), 0.1, None, (10, 10)),  # face to face
+        ((1.0, 0.0), 0.05, None, (10, 20)),
+        ((0.5, 0.0), 0.1, None, (60, 60)),
+        ((0.0, 0.0), 0.1, None, (100, 100)),
+        ((1.1, 0.0), 0.1, None, None),
+        ((0.0, -2.0), 0.1, None, None),
+        ((1.5, 0.0), 0.1, (2.5, 4.0), (10, 10)),  # through the side of the box
+        ((1.5, 0.0), 0.1, (2.8, 4.0), None),
+    ],
+)
+def test_bodies_that_overlap_or_touch_are_named(corner, other, periodic, counts, caplog):
+    with caplog.at_level(logging.WARNING):
+        es.Simulation([block((0.0, 0.0), "left"), block(corner, "right", other)], periodic=periodic)
+    if counts is None:
+        assert not caplog.records
+        return
+    (line,) = (record.getMessage() for record in caplog.records)
+    assert line.startswith("bodies 'left' and 'right' overlap or touch: ")
+    assert f"{counts[0]} particles of 'left' and {counts[1]} particles of 'right' lie within 1.25 spacings" in line
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 3), st.integers(0, 10**6))
+def test_overlaps_are_those_of_a_search_through_all_pairs(dim, seed):
+    from warp_eulsph.overlap import TOUCHING, overlaps
+
+    rng = np.random.default_rng(seed)
+    x, y = (rng.random((count, dim)) * rng.uniform(0.2, 2.0) for count in (40, 60))
+    spacing, other = rng.uniform(0.01, 0.3, 40), rng.uniform(0.01, 0.3, 60)
+    bodies = [
+        es.Body(x=places, volume=1.0, spacing=s, material=RUBBER, name=name)
+        for places, s, name in ((x, spacing, "a"), (y, other, "b"))
+    ]
+    far = np.linalg.norm(x[:, None] - y[None], axis=2)
+    close = far < TOUCHING * 0.5 * (spacing[:, None] + other[None])
+    found = overlaps(bodies, [np.zeros(40, dtype=bool), np.zeros(60, dtype=bool)], (0.0,) * dim)
+    if close.any():
+        counts = close.any(axis=1).sum(), close.any(axis=0).sum()
+        assert f"{counts[0]} particles of 'a' and {counts[1]} particles of 'b'" in found[0]
+    else:
+        assert not found
+
+
+def test_mirror_ghosts_are_no_overlap(caplog):
+    left, ghosts = es.mirror(block((0.0, 0.0), "left"), point=(1.0, 0.0), normal=(1.0, 0.0), depth=0.5)
+    with caplog.at_level(logging.WARNING):
+        es.Simulation([left, block((1.2, 0.0), "right")], boundaries=[ghosts])
+    assert not caplog.records
+
+
+@pytest.mark.parametrize(("corner", "dtype", "warns"), [(1e5, 32, True), (1e5, 64, False), (1.0, 32, False)])
+def test_float32_far_from_the_origin_is_said(corner, dtype, warns, caplog):
+    with caplog.at_level(logging.WARNING):
+        es.Simulation(block((corner, 0.0), "far"), dtype=wp.float32 if dtype == 32 else wp.float64)
+    assert ("put the origin into the bodies, or use float64" in caplog.text) == warns
+
+
+@pytest.mark.parametrize("pairs", [2**31, 2**32 + 5])
+def test_more_pairs_than_can_be_numbered_are_refused(pairs):
+    lists = plate().configuration.lists
+    with pytest.raises(ValueError, match=f"number at most {MOST_PAIRS} pairs, 36 particles have"):
+        many = np.full(len(lists.count), pairs // N + 1, dtype=np.int32)
+        lists.count.assign(many)
+        lists.make_room()
+    lists._total.fill_(-5)  # as the sum on the device is after 2³¹
+    with pytest.raises(ValueError, match="number at most"):
+        _ = lists.pairs

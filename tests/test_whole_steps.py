@@ -1,0 +1,139 @@
+"""Nothing goes on from the middle of a step: Ctrl-C waits, any other exception breaks the simulation until restore."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kept_runs import plate, recording
+from test_resume import bits
+
+import warp_eulsph as es
+from warp_eulsph.output import record, write_snapshot
+from warp_eulsph.output.checkpoint import take
+from warp_eulsph.whole import BrokenError, Whole
+
+
+def driven(failing=lambda call: None):
+    """A plate under a load that the host gives; ``failing`` is told the number of each call."""
+    calls = iter(range(10**9))
+
+    def load(x, t):
+        failing(next(calls))
+        return 1e5 * np.sin(50.0 * t) + 0.0 * x
+
+    body = plate().bodies[0]
+    held = es.Velocity(lambda X: X[:, 0] < 0.2, value=lambda x, t: 0.0 * load(x, t))
+    return es.Simulation(body, boundaries=[held, es.BodyForce(load)])
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    simulation = driven()
+    simulation.step(4)
+    return bits(simulation)
+
+
+class OddError(Exception):
+    """What a user's function raises."""
+
+
+@pytest.mark.parametrize("kind", [OddError, KeyboardInterrupt, MemoryError, SystemExit])
+@pytest.mark.parametrize("call", range(3, 11))
+def test_exceptions_at_every_call_break_it_until_restore(call, kind, undisturbed, tmp_path):
+    def failing(number):
+        if number == call:
+            raise kind("from a load")
+
+    simulation = driven(failing)
+    start = take(simulation, {}, {})
+    with pytest.raises(kind):
+        simulation.step(4)
+    steps = simulation.steps
+    for again in (
+        lambda: simulation.run(until=1.0),
+        lambda: simulation.step(),
+        lambda: simulation.advance(1.0),
+        lambda: take(simulation, {}, {}),
+        lambda: write_snapshot(tmp_path / "half.vtkhdf", simulation),
+        lambda: record(simulation, tmp_path / "run", 1.0, recording(simulation, probes=[])),
+    ):
+        with pytest.raises(BrokenError, match=rf"left half done by {kind.__name__}: from a load.*restore\(\)"):
+            again()
+    assert simulation.steps == steps and not (tmp_path / "run" / "run.json").exists()
+    simulation.restore(start.arrays, start.counters)
+    simulation.step(4)
+    assert bits(simulation) == undisturbed
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 1.0))
+def test_ctrl_c_at_any_moment_waits_for_the_end_of_the_step(share):
+    for graphs in (False, True):
+        simulation, whole = plate(), plate()
+        simulation.by_graphs = whole.by_graphs = graphs
+        simulation.step(3), whole.step(3)
+        begin = time.perf_counter()
+        whole.step(20)
+        timer = threading.Timer(share * (time.perf_counter() - begin), os.kill, (os.getpid(), signal.SIGINT))
+        before = signal.getsignal(signal.SIGINT)
+        try:
+            timer.start()
+            simulation.step(20)
+            timer.join()
+            time.sleep(0.01)
+        except KeyboardInterrupt:
+            pass
+        timer.join()
+        assert signal.getsignal(signal.SIGINT) is before
+        simulation.step(23 - simulation.steps)
+        assert bits(simulation) == bits(whole)
+
+
+def test_a_second_signal_breaks_in_at_once_and_is_not_forgotten():
+    whole = Whole()
+    with pytest.raises(KeyboardInterrupt), whole:
+        signal.raise_signal(signal.SIGINT)
+        reached = True
+        signal.raise_signal(signal.SIGINT)
+        reached = False
+    assert reached and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with pytest.raises(BrokenError, match="by KeyboardInterrupt"):
+        whole.check()
+    whole.mend()
+    whole.check()
+
+
+def test_signals_of_others_are_left_alone():
+    seen = []
+    for handler in (signal.SIG_IGN, lambda number, frame: seen.append(number)):
+        whole = Whole()
+        before = signal.signal(signal.SIGINT, handler)
+        try:
+            with whole:
+                signal.raise_signal(signal.SIGINT)
+                assert not seen
+            assert signal.getsignal(signal.SIGINT) is handler and whole.broken is None
+            assert len(seen) == callable(handler)
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+
+def test_steps_in_other_threads_touch_no_signals():
+    simulation, before = plate(), signal.getsignal(signal.SIGINT)
+    thread = threading.Thread(target=simulation.step)
+    thread.start()
+    thread.join()
+    assert simulation.steps == 1 and signal.getsignal(signal.SIGINT) is before
+
+
+def test_holding_signals_costs_next_to_nothing():
+    whole, begin = Whole(), time.perf_counter()
+    for _ in range(1000):
+        with whole:
+            pass
+    assert (time.perf_counter() - begin) / 1000 < 50e-6  # s; a step takes a millisecond

@@ -1,0 +1,52 @@
+"""When a run has failed, and what the user is told: a bad particle, a step that vanished, energy that a step made."""
+
+from typing import Any
+
+import numpy as np
+
+from .scheme.health import UnstableError, last_good
+
+# A time step that fell below this share of the longest one means neighbourhoods that collapsed: the run would not end.
+STALLED = 1e-6
+# Share of the most energy there ever was that the steps themselves may make. Verlet's wobble is 1e-5 of it, and even the
+# midpoint rule at twice its step fails within a few steps once a tenth was made; what follows is worth nothing.
+MADE = 0.5
+
+
+def failure(simulation: Any) -> UnstableError | None:
+    """What is wrong with the present state of a ``Simulation``, None while all is well; reads the device."""
+    place, dt = simulation.clock.bad, simulation.clock.free_dt
+    remedy = "try a smaller cfl, a finer resolution or a limiter"
+    if place is not None:
+        particle = int(simulation.order.ids.numpy()[place])
+        x, v, F = simulation.x[particle], simulation.v[particle], simulation.F[particle]
+        if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
+            what = f"det F = {np.linalg.det(F):.4g}, must be positive"
+        else:
+            what = f"non-finite values, v = {v}, F = {F.tolist()}"
+    elif dt < STALLED * simulation.clock.longest_dt:
+        particle = _fastest(simulation)
+        what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
+    elif (made := simulation.stepper.ledger.made()) > MADE:
+        particle = _fastest(simulation)
+        what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
+        remedy = f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
+    else:
+        return None
+    return UnstableError(
+        f"unstable at t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
+        f"{where(simulation, particle, simulation.x)} has {what}; {last_good(simulation.output)}; {remedy}",
+        particle,
+        simulation.t,
+        simulation.steps,
+    )
+
+
+def where(simulation: Any, particle: int, x: np.ndarray) -> str:
+    """Words on a particle's body and place."""
+    name = next(name for name, indices in simulation.ranges.items() if particle in indices)
+    return f"of body {name!r} at x = {np.array2string(x[particle], precision=6)} m"
+
+
+def _fastest(simulation: Any) -> int:
+    return int(simulation.order.by_number(simulation.stepper.flux.fields.speed.numpy()).argmax())
