@@ -1,5 +1,7 @@
 """Balanced pair vectors (M13), the smoothing length that follows the volume, and the step that both allow (M14)."""
 
+import contextlib
+
 import numpy as np
 import pytest
 import warp as wp
@@ -138,9 +140,10 @@ def test_step_neither_feeds_nor_damps_waves():
         step = es.TimeStep(cfl=0.8)
         simulation = es.Simulation(body, reference=es.Never(), scheme=scheme, time_step=step, periodic=(1.0,))
         speeds = []
-        for _ in range(10):
-            simulation.step(100)
-            speeds.append(simulation.energy()["total"])
+        with contextlib.suppress(es.UnstableError):  # which midpoint raises once its steps have made half of the energy
+            for _ in range(10):
+                simulation.step(100)
+                speeds.append(simulation.energy()["total"])
         largest[type(scheme)] = max(speeds) / (0.5 * 1e-12 * 0.5)
     assert largest[es.Verlet] == pytest.approx(1.0, abs=0.02)  # (ωΔt)²/8 of a wave 24 particles long is 0.006
     assert largest[es.LaxWendroff] > 1.05

@@ -14,11 +14,23 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "atomics", "simd", "order"},
+    {"space", "linalg", "execution", "atomics", "simd", "order", "checks"},
     {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "transport", "diagnostics", "memory", "sorting", "output", "geometry"},
+    {
+        "simulation",
+        "transport",
+        "diagnostics",
+        "memory",
+        "sorting",
+        "output",
+        "geometry",
+        "arguments",
+        "failure",
+        "overlap",
+        "whole",
+    },
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

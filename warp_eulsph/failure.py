@@ -8,9 +8,11 @@ from .scheme.health import UnstableError, last_good
 
 # A time step that fell below this share of the longest one means neighbourhoods that collapsed: the run would not end.
 STALLED = 1e-6
-# Share of the most energy there ever was that the steps themselves may make. Verlet's wobble is 1e-5 of it, and even the
-# midpoint rule at twice its step fails within a few steps once a tenth was made; what follows is worth nothing.
+# Share of the most energy there ever was that the steps themselves may make. Verlet's wobble is 1e-5 of it, and the
+# midpoint rule at twice its step fails within a few steps once it made a tenth; what follows is worth nothing.
 MADE = 0.5
+# Steps before that is asked: loads on a body at rest have done no work yet.
+SETTLING = 100
 
 
 def failure(simulation: Any) -> UnstableError | None:
@@ -27,7 +29,7 @@ def failure(simulation: Any) -> UnstableError | None:
     elif dt < STALLED * simulation.clock.longest_dt:
         particle = _fastest(simulation)
         what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
-    elif (made := simulation.stepper.ledger.made()) > MADE:
+    elif simulation.steps > SETTLING and (made := simulation.stepper.ledger.made()) > MADE:
         particle = _fastest(simulation)
         what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
         remedy = f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
