@@ -147,21 +147,23 @@ def test_total_lagrangian_block_is_accurate_at_a_shear_of_two():
 def test_map_tells_accurate_from_failed_and_writes_its_files(tmp_path):
     """A run with steps far beyond its limit fails, at its mark and at all later ones, and says why."""
 
-    def start(n, reference):
-        options = {"time_step": es.TimeStep(fixed=2e-2)} if isinstance(reference, es.Always) else {}
+    def start(n, reference, **options):
+        if isinstance(reference, es.Always):
+            options["time_step"] = es.TimeStep(fixed=2e-2)
         return distortion_problems.start_shear(n, reference, **options)
 
     problem = replace(
         distortion_problems.PROBLEMS[0], levels=(12,), marks={0.2: 0.02, 0.5: 0.05, 3.0: 0.3}, start=start
     )
-    verdicts = list(distortion_map.judge(problem, "always", 12))
+    verdicts = list(distortion_map.judge(problem, "default", 12))
     assert verdicts[-1].verdict == "failed" and verdicts[-1].reason and verdicts[-1].error is None
     problem = replace(problem, marks={0.2: 0.02, 0.5: 0.05})
-    verdicts = distortion_map.run([problem], ("never", "every 10"), False, tmp_path)
+    names = ("current, every 10", "current, criterion")
+    verdicts = distortion_map.run([problem], names, False, tmp_path)
     assert [(v.reference, v.distortion, v.verdict) for v in verdicts] == [
-        (name, mark, "accurate") for name in ("never", "every 10") for mark in problem.marks
+        (name, mark, "accurate") for name in names for mark in problem.marks
     ]
     lines = (tmp_path / "distortion.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 5 and lines[0].startswith("problem,reference,level,distortion,verdict")
-    assert "| every 10 | accurate" in (tmp_path / "distortion.md").read_text(encoding="utf-8")
+    assert "| current, every 10 | accurate" in (tmp_path / "distortion.md").read_text(encoding="utf-8")
     assert (tmp_path / "distortion_map.png").read_bytes().startswith(b"\x89PNG")

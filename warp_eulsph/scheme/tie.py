@@ -29,7 +29,7 @@ class Tie:
         stiffness: χ, over Ē, the modulus of pressure waves M or 4μ, whichever is less: M where Poisson's ratio is ⅓.
             Beyond that volume would resist what the tie is to hold, and coarse bodies lock. At 1 it raises the highest
             frequency of a body, and so the cost of a run, by less than a tenth (``tests/test_tie.py``); stiffer ties
-            make coarse bodies stiffer, and their F worse near edges (docs/method.md, §10).
+            make coarse bodies stiffer, and their F worse near edges (docs/method.md, §7).
     """
 
     stiffness: float = 0.5

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import ReferencePolicy, Simulation
-from .cases import bending_column, punch, shear, spinning_plate, twisting_column, vortex
+from .cases import bending_column, extension, punch, shear, spinning_plate, twisting_column, vortex
 from .figures import rms
 from .history import at, series
 from .solids import MaterialPoint
@@ -68,6 +68,17 @@ def start_shear(n: int, reference: ReferencePolicy, **options: Any) -> Run:
     def error() -> float:
         now = shear.errors(simulation, upper)
         return max(now["F"], now["stress"])
+
+    return Run(simulation, error)
+
+
+def start_extension(n: int, reference: ReferencePolicy, **options: Any) -> Run:
+    """The jittered block pulled by its ends, slowly."""
+    simulation, pulled = extension.build(2, n, reference, 0.1, **options)
+
+    def error() -> float:
+        now = extension.errors(simulation, pulled)
+        return max(abs(now["reaction"]), now["spread"])
 
     return Run(simulation, error)
 
@@ -150,6 +161,15 @@ PROBLEMS = (
         {gamma: gamma / shear.RATE for gamma in (0.5, 1.0, 2.0, 5.0, 8.0)},
         0.01,
         start_shear,
+    ),
+    Problem(
+        "extension",
+        "stretch",
+        "of the reaction, or spread of F11",
+        (12, 24),
+        {stretch: (stretch - 1.0) / extension.SLOW for stretch in (1.25, 1.5, 2.0, 3.0, 5.0)},
+        0.05,
+        start_extension,
     ),
     Problem(
         "vortex",
