@@ -12,7 +12,7 @@ STALLED = 1e-6
 # midpoint rule at twice its step fails within a few steps once it made a tenth; what follows is worth nothing.
 MADE = 0.5
 # Steps before that is asked: loads on a body at rest have done no work yet.
-SETTLING = 20
+SETTLING = 100
 
 
 def failure(simulation: Any) -> UnstableError | None:
