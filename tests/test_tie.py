@@ -137,6 +137,25 @@ def test_hourglass_modes_come_back(tie):
         assert min(shares) < 0.0 and abs(shares[-1]) < 0.3
 
 
+@pytest.mark.parametrize("reference", [es.Never(), es.Every(50)], ids=repr)
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_mismatch_is_seen(dim, reference):
+    """The rms of r over a particle's pairs, in spacings: in numpy, for positions and F that have nothing in common."""
+    n = COUNT[dim]
+    simulation = jittered(dim, reference=reference, arrangement=es.Current())
+    X, rng = simulation.X, np.random.default_rng(3)
+    x, F = X + 0.1 / n * rng.normal(size=X.shape), np.eye(dim) + 0.1 * rng.normal(size=(n**dim, dim, dim))
+    simulation.stepper.U.x.assign(x)
+    simulation.stepper.U.F.assign(F)
+    near, w = simulation.configuration.near, simulation.configuration.near.w.numpy()
+    a, b = np.repeat(np.arange(n**dim), np.diff(near.start.numpy())), near.index.numpy()[: len(w)]
+    a, w = a[: len(b)], w[: len(a)]
+    r = x[b] - x[a] - 0.5 * np.einsum("nij,nj->ni", F[a] + F[b], X[b] - X[a])
+    squares, total = (np.bincount(a, w * value, n**dim) for value in ((r**2).sum(axis=1), np.ones(len(a))))
+    np.testing.assert_allclose(simulation.mismatch, np.sqrt(squares / total) * n, rtol=1e-12)
+    assert simulation.extrema()["mismatch"] == simulation.mismatch.max() > 0.05
+
+
 @pytest.mark.parametrize(("dim", "n"), [(2, 8), (3, 5)])
 def test_it_costs_less_than_a_tenth_of_the_step(dim, n):
     """Highest frequency of a free block with corners, 20 % jitter, by power iteration on its forces."""

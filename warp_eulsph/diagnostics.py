@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .fields import structure
-from .linalg import det
+from .fields import neighbour_structure, structure
+from .linalg import det, inverse
 from .reduce import Sum, SumOfParticles
-from .space import Space
+from .scheme.reference import Configuration
+from .space import Space, difference
 
 _Vec6 = wp.types.vector(length=6, dtype=wp.float64)
 _Vec11 = wp.types.vector(length=11, dtype=wp.float64)
@@ -64,6 +65,48 @@ def _make_extrema(space: Space) -> Any:
         wp.atomic_max(out, 2, wp.length(state.v[a]))
 
     return find_extrema
+
+
+@functools.cache
+def _make_mismatch(space: Space, fixed: bool) -> Any:
+    """Kernel: root of the mean square of r_ab (M16) since the last refresh, weighted as in M4, over the spacing."""
+    real, mat, dim = space.real, space.mat, space.dim
+    Particles, Reference, State = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        structure(space, "State"),
+    )
+    Neighbours, separation, invert = neighbour_structure(space), difference(space), inverse(space)
+
+    @wp.func
+    def strain(a: int, state: State, reference: Reference) -> mat:
+        G = state.F[a]
+        if wp.static(not fixed):
+            G = G @ invert(reference.F[a])
+        return G - wp.identity(n=wp.static(dim), dtype=real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def mismatch(
+        first: int,
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        state: State,
+        out: wp.array(dtype=real),
+        largest: wp.array(dtype=real),
+    ):
+        a = first + wp.tid()
+        X_a, u_a, H_a = reference.x[a], state.x[a] - reference.x[a], strain(a, state, reference)
+        total = real(0.0)
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            half = (H_a + strain(b, state, reference)) * real(0.5)
+            r = state.x[b] - reference.x[b] - u_a - half @ separation(reference.x[b], X_a, near.box)
+            total += near.w[k] * wp.dot(r, r)
+        out[a] = wp.sqrt(total / wp.max(reference.diagonal[a], real(1e-30))) / particles.spacing[a]
+        wp.atomic_max(largest, 0, out[a])
+
+    return mismatch
 
 
 @functools.cache
@@ -161,6 +204,18 @@ class Diagnostics:
         self._total = wp.zeros(1, dtype=_Vec6, device=device)
         self._extrema = wp.zeros(3, dtype=space.real, device=device)
         self._sum = SumOfParticles(_Vec6, len(particles.mass), device)
+        self._mismatch = wp.zeros(0, dtype=space.real, device=device)
+        self._largest = wp.zeros(1, dtype=space.real, device=device)
+
+    def mismatch(self, configuration: Configuration, state: Any) -> tuple[wp.array, float]:
+        """How far positions and F disagree around each particle, in spacings, (n,) on the device, and the largest."""
+        if len(self._mismatch) == 0:
+            self._mismatch = wp.zeros(len(state.x), dtype=self.space.real, device=self.device)
+        self._largest.zero_()
+        arguments = [0, self.particles, configuration.fields, configuration.near, state, self._mismatch, self._largest]
+        kernel = _make_mismatch(self.space, configuration.fixed)
+        wp.launch(kernel, len(state.x), arguments, device=self.device)
+        return self._mismatch, float(self._largest.numpy()[0])
 
     def momenta(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
         """Linear [kg m/s] and angular momentum about the origin [kg m²/s], both padded to (3,)."""

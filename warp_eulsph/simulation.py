@@ -301,8 +301,15 @@ class Simulation:
         return self.order.by_number(self.diagnostics.jacobians(self.stepper.U))
 
     def extrema(self) -> dict[str, float]:
-        """Least and largest volume ratio det F [-] and largest speed [m/s], over all particles."""
-        return dict(zip(("least J", "largest J", "speed"), self.diagnostics.extrema(self.stepper.U), strict=True))
+        """Least and largest volume ratio det F [-], largest speed [m/s] and largest mismatch [spacings]."""
+        U = self.stepper.U
+        found = dict(zip(("least J", "largest J", "speed"), self.diagnostics.extrema(U), strict=True))
+        return found | {"mismatch": self.diagnostics.mismatch(self.configuration, U)[1]}
+
+    @property
+    def mismatch(self) -> np.ndarray:
+        """How far positions and F disagree around each particle [spacings], rms of r_ab of its pairs (M16), (n,)."""
+        return self.order.by_number(self.diagnostics.mismatch(self.configuration, self.stepper.U)[0].numpy())
 
     def energy(self) -> dict[str, float]:
         """Energies [J]: kinetic, stored in strain, in the tie (M16), total, what each mechanism added, the residual."""
