@@ -9,6 +9,7 @@ from warp_eulsph.validation.cases import extension, hanging, shear
 
 RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 WATER = es.TaitLiquid(density=1000.0, sound_speed=100.0)
+SOFT = es.NeoHookean(density=1000.0, young=1e6, poisson=0.3)
 POLICIES = [es.Always(), es.Every(10), es.WhenDistorted(1.2)]
 
 
@@ -113,8 +114,49 @@ def test_other_corrections_want_one_kind_of_arrangement():
 def test_steps_that_make_energy_are_refused():
     """A sheared block at twice the tested step used to end, without a word, at many times its energy."""
     x, volume = box((0.0, 0.0), (1.0, 1.0), 1 / 12)
-    material = es.NeoHookean(density=1000.0, young=1e6, poisson=0.3)
-    body = es.Body(x=x, volume=volume, material=material, velocity=2.0 * x[:, 1:] * [1.0, 0.0])
+    body = es.Body(x=x, volume=volume, material=SOFT, velocity=2.0 * x[:, 1:] * [1.0, 0.0])
     simulation = es.Simulation(body, time_step=es.TimeStep(cfl=1.6))
     with pytest.raises(es.UnstableError, match=r"the steps have made .* cfl is 1.6, 0.8 is the scheme's own"):
         simulation.run(0.5)
+
+
+@pytest.mark.parametrize("jitter", [0.1, 0.2])
+def test_jittered_beams_keep_their_energy(jitter):
+    """A cantilever that swings: as much as on the lattice, to 3e-3. Read anew, 7 and 28 % more were lost."""
+    kept = []
+    for of_lattice in (0.0, jitter):
+        n = 6
+        x, volume = box((0.0, 0.0), (6.0, 1.0), 1.0 / n, jitter=of_lattice)
+        held = es.Fixed(np.flatnonzero(box((0.0, 0.0), (6.0, 1.0), 1.0 / n)[0][:, 0] < 1.0 / n))
+        body = es.Body(
+            x=x, volume=volume, spacing=1.0 / n, material=RUBBER, velocity=(x[:, :1] / 6.0) ** 2 * [0.0, 3.0]
+        )
+        simulation = es.Simulation(body, boundaries=[held])
+        start = simulation.energy()["total"]
+        simulation.run(0.3)
+        kept.append(simulation.energy()["total"] / start)
+    assert kept[0] > 0.98 and kept[1] == pytest.approx(kept[0], abs=3e-3)
+
+
+def test_jittered_periodic_bodies_carry_waves():
+    """A finite shear wave in a periodic box, 10 % jitter, no surface vectors given: 93 % of it used to be lost."""
+    kept = []
+    for jitter in (0.0, 0.1):
+        x, volume = box((0.0, 0.0), (1.0, 1.0), 1 / 24, jitter=jitter)
+        velocity = 6.0 * np.sin(2.0 * np.pi * x[:, :1]) * [0.0, 1.0]
+        simulation = es.Simulation(es.Body(x=x, volume=volume, material=SOFT, velocity=velocity), periodic=(1.0, 1.0))
+        start = simulation.energy()["total"]
+        simulation.run(0.1)
+        kept.append(simulation.energy()["total"] / start)
+    assert kept[0] > 0.94 and kept[1] == pytest.approx(kept[0], abs=0.02)
+
+
+@pytest.mark.parametrize("aspect", [2, 4])
+def test_lattices_of_oblong_cells_hold(aspect):
+    x, volume = box((0.0, 0.0), (1.0 * aspect, 1.0), 0.1)
+    x[:, 0] /= aspect
+    body = es.Body(x=x, volume=volume / aspect, material=SOFT, velocity=20.0 * np.sin(2.0 * x[:, :1]) * [0.0, 1.0])
+    simulation = es.Simulation(body)
+    start = simulation.energy()["total"]
+    simulation.run(0.1)
+    assert 0.97 * start < simulation.energy()["total"] <= start * (1.0 + 1e-4)
