@@ -13,7 +13,6 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.output import Figure, SnapshotWriter, table
@@ -69,7 +68,6 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("-n", type=int, default=40, help="particles along the bar")
     parser.add_argument("--output", type=Path, default=Path("runs/bar"), help="directory of picture and snapshots")
     args = parser.parse_args(argv)
-    wp.config.log_level = wp.LOG_WARNING
     histories, checked = {}, []
     for name, (reference, scheme) in RUNS.items():
         simulation = build(args.n, reference, scheme)

@@ -13,7 +13,6 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import warp as wp
 
 from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
 from warp_eulsph.validation.cases.bending_column import FIRST_SWING, SERIES, build, extrema, measure
@@ -85,7 +84,6 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("--until", type=float, default=FIRST_SWING, help="end time [s]; three swings end at 2.6")
     parser.add_argument("--output", type=Path, default=Path("runs/bending_column"))
     args = parser.parse_args(argv)
-    wp.config.log_level = wp.LOG_WARNING
     bent = series(SERIES)
     simulation, writer = build(args.dim, args.n, FORMS[args.reference]), SnapshotWriter(args.output)
     history = measure(simulation, args.until, writer)

@@ -12,8 +12,6 @@ volume ratios, and stored + kinetic energy over the punch's work; draws the reac
 import argparse
 from pathlib import Path
 
-import warp as wp
-
 from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
 from warp_eulsph.validation.cases.punch import END_TIME, REACTIONS, SERIES, build, measure, near
 from warp_eulsph.validation.history import History, at, series
@@ -68,7 +66,6 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("--reference", choices=FORMS, default="eulerian")
     parser.add_argument("--output", type=Path, default=Path("runs/punch"))
     args = parser.parse_args(argv)
-    wp.config.log_level = wp.LOG_WARNING
     reference = series(SERIES)
     simulation, punch = build(args.n, FORMS[args.reference])
     writer = SnapshotWriter(args.output)

@@ -11,7 +11,6 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
@@ -71,7 +70,6 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("--until", type=float, default=0.02, help="end time [s], at most 0.15; the bands are for 0.02")
     parser.add_argument("--output", type=Path, default=Path("runs/spinning_plate"))
     args = parser.parse_args(argv)
-    wp.config.log_level = wp.LOG_WARNING
     reference = series(SERIES)
     simulation, writer = build(args.n, FORMS[args.reference]), SnapshotWriter(args.output)
     history = measure(simulation, args.until, writer)

@@ -11,8 +11,6 @@ the energy kept against the reference (twist_2.csv); draws the rotation over tim
 import argparse
 from pathlib import Path
 
-import warp as wp
-
 from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
 from warp_eulsph.validation.cases.twisting_column import END_TIME, build, measure, reference_history
 from warp_eulsph.validation.history import History
@@ -69,7 +67,6 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("--reference", choices=FORMS, default="eulerian")
     parser.add_argument("--output", type=Path, default=Path("runs/twisting_column"))
     args = parser.parse_args(argv)
-    wp.config.log_level = wp.LOG_WARNING
     reference = reference_history()
     simulation, writer = build(args.n, FORMS[args.reference]), SnapshotWriter(args.output)
     history = measure(simulation, writer)

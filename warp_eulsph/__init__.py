@@ -35,6 +35,7 @@ from .materials import (
     SaintVenantKirchhoff,
     TaitLiquid,
 )
+from .notices import sum_up_compiling
 from .operators.values import Linear, Shepard
 from .order import spatial_order
 from .scheme.balance import Balance
@@ -114,3 +115,5 @@ __all__ = [
     "mirror",
     "spatial_order",
 ]
+
+sum_up_compiling()
