@@ -15,10 +15,10 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
     {"space", "linalg", "execution", "atomics", "simd", "order", "notices"},
-    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
+    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule", "summary"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "transport", "diagnostics", "memory", "sorting", "output", "geometry"},
+    {"simulation", "looks", "progress", "transport", "diagnostics", "memory", "sorting", "output", "geometry"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},
