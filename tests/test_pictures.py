@@ -277,8 +277,29 @@ def test_xdmf_in_vtk(run):
             np.testing.assert_array_equal(values.reshape(len(values), -1)[:, : expected.shape[1]], expected)
 
 
+def test_pvd_and_vtu_in_pyvista(run, tmp_path):
+    """Every time with its fields, exact; a .vtu alone too, of one frame only."""
+    import pyvista
+
+    reader = pyvista.get_reader(export(list(run), tmp_path / "a.pvd", ["velocity", "J", "deformation_gradient"]))
+    assert reader.time_values == [frame.time for frame in run]
+    for k, frame in enumerate(run):
+        reader.set_active_time_point(k)
+        data, dim = reader.read()[0], frame.x.shape[1]
+        np.testing.assert_array_equal(data.points[:, :dim], frame.x)
+        np.testing.assert_array_equal(data["velocity"][:, :dim], frame.v)
+        np.testing.assert_array_equal(data["J"], frame["J"])
+        np.testing.assert_array_equal(data["deformation_gradient"].reshape(-1, 3, 3)[:, :dim, :dim], frame.F)
+        assert data.n_cells == data.n_points == len(frame.x)
+    single = pyvista.read(export([run[-1]], tmp_path / "b.vtu"))
+    np.testing.assert_array_equal(single["cauchy_stress"], run[-1].cauchy_stress.reshape(-1, 9))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "a.pvd", "b.vtu"]
+    with pytest.raises(ValueError, match=r"a \.vtu holds one frame, got 4; choose one"):
+        export(list(run), tmp_path / "c.vtu")
+
+
 def test_bad_exports_are_named(run, tmp_path):
-    with pytest.raises(ValueError, match=r"ending must be one of .vtkhdf, .xdmf, .csv, .npz, got '.txt'"):
+    with pytest.raises(ValueError, match=r"ending must be one of .vtkhdf, .xdmf, .vtu, .pvd, .csv, .npz, got '.txt'"):
         export(list(run), tmp_path / "a.txt")
     with pytest.raises(ValueError, match=r"fields must be among \['J'.*got \['speed'\]"):
         export(list(run), tmp_path / "a.npz", ["speed"])

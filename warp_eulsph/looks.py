@@ -27,6 +27,11 @@ class Looks:
     particles: Any
 
     @property
+    def X(self) -> np.ndarray:
+        """Initial positions [m], (n, dim)."""
+        return np.concatenate([body.x for body in self.bodies])
+
+    @property
     def displacement(self) -> np.ndarray:
         """Displacements x − X since the start [m], (n, dim)."""
         return self.x - self.X
@@ -45,7 +50,7 @@ class Looks:
 
         F is the one the material carries: of a liquid its volume only.
         """
-        from .output.stress import padded
+        from .output.tensors import padded
 
         F = padded(self.F, 1.0)
         return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)

@@ -255,11 +255,6 @@ class Simulation(Looks):
         return self.stepper.configuration
 
     @property
-    def X(self) -> np.ndarray:
-        """Initial positions [m], (n, dim)."""
-        return np.concatenate([body.x for body in self.bodies])
-
-    @property
     def x(self) -> np.ndarray:
         """Positions [m], a copy of shape (n, dim)."""
         return self.order.by_number(self.stepper.U.x.numpy())
