@@ -327,6 +327,14 @@ class Run(Sequence[RunFrame]):
         return self.directory.read(self.directory.description)
 
     @property
+    def title(self) -> str:
+        """Of the case that was run; empty if it has none."""
+        try:
+            return str(self.description.get("case", {}).get("title") or "")
+        except OSError:  # snapshots alone have no description
+            return ""
+
+    @property
     def environment(self) -> dict[str, Any]:
         """Versions and device of each session of the run."""
         return self.directory.read(self.directory.environment)
