@@ -16,7 +16,26 @@ from pathlib import Path
 
 import numpy as np
 
-from warp_eulsph.validation.cases.cosine_profile import END, EXPECTED, LAX, LAX_WENDROFF, measure, profile, solve
+from warp_eulsph.scheme.scalar import ConservationLaw, LinearAdvection, Scheme
+from warp_eulsph.validation.cases.cosine_profile import EXPECTED, LAX, LAX_WENDROFF, measure
+
+PARTICLES, BOX, END = 50, 3.0, 0.6
+
+
+def profile(x: np.ndarray, centre: float) -> np.ndarray:
+    """The cosine hat of half width 0.12."""
+    away = np.abs(x - centre)
+    return np.where(away <= 0.12, 0.5 * (1.0 + np.cos(np.pi * away / 0.12)), 0.0)
+
+
+def solve(scheme: Scheme, dilation: float, cfl: float) -> tuple[np.ndarray, np.ndarray]:
+    """Positions in ]0, 1[ and the solution there at t = 0.6."""
+    dx = 1.0 / PARTICLES
+    x = (np.arange(round(BOX / dx)) + 0.5) * dx
+    start, flux = profile(x, 0.2), LinearAdvection((1.0,))
+    law = ConservationLaw(x[:, None], dx, start, flux=flux, scheme=scheme, dilation=dilation, periodic=(BOX,))
+    law.run(END, cfl * dx)
+    return x[:PARTICLES], law.values[:PARTICLES]
 
 
 def figures(x: np.ndarray, u: np.ndarray) -> tuple[str, str, str, str]:

@@ -55,6 +55,20 @@ def test_free_fall_is_exact(counts, reference, dtype, tolerance):
     np.testing.assert_allclose(simulation.x, body.x + body.velocity * t + 0.5 * g * t**2, rtol=0, atol=tolerance)
 
 
+@pytest.mark.parametrize("counts", [(8,), (5, 4), (4, 4, 4)], ids=str)
+def test_gravity_pulls_one_body_down_the_last_axis(counts):
+    dim = len(counts)
+    far = np.eye(dim)[0] * 10.0
+    a, b = block(*counts, name="a"), es.Body(x=block(*counts).x + far, volume=DX**dim, material=RUBBER, name="b")
+    simulation = es.Simulation([a, b], boundaries=[es.Gravity(body="a")], time_step=es.TimeStep(fixed=1e-4))
+    simulation.step(10)
+    fallen = np.zeros((2 * len(a.x), dim))
+    fallen[: len(a.x), -1] = -9.81e-3
+    np.testing.assert_allclose(simulation.v, fallen, atol=1e-11)
+    with pytest.raises(ValueError, match=r"Gravity: g must be finite, got inf"):
+        es.Gravity(np.inf)
+
+
 @pytest.mark.parametrize("normal", [(3.0, 4.0), (1.0, -2.0, 2.0)], ids=str)
 def test_roller_is_an_inclined_plane(normal):
     body, g = block(*(4,) * len(normal)), np.array([0.0, -10.0, 1.0])[: len(normal)]

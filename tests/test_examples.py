@@ -1,13 +1,16 @@
 """Every example runs, small: figures in their bands (it exits otherwise), picture and snapshots there."""
 
 import importlib
+import inspect
 import json
 from pathlib import Path
 
 import h5py
 import pytest
 
+import warp_eulsph as es
 from warp_eulsph.output import Figure, Run, read_snapshot, table
+from warp_eulsph.output.description import describe
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -92,6 +95,33 @@ def test_failed_check_ends_the_example(run):
     """Six particles along the block's side are too few for the reaction at 15 ms."""
     with pytest.raises(SystemExit, match=r"outside the accepted band: .*'reaction at 15 ms"):
         run("punch", "-n", "6")
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("bar", (12, es.Always(), es.LaxWendroff())),
+        ("spinning_plate", (6, es.Never())),
+        ("bending_column", (2, 4, es.Always())),
+        ("bending_column", (3, 2, es.Always())),
+        ("twisting_column", (2, es.Always())),
+        ("punch", (6, es.Always())),
+    ],
+)
+def test_set_up_is_shown_and_is_the_one_that_is_validated(name, arguments, monkeypatch):
+    """The example builds in thirty lines of its own what ``validate`` judges: the same bodies and conditions."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    shown, judged = importlib.import_module(name), importlib.import_module(f"warp_eulsph.validation.cases.{name}")
+    source = inspect.getsource(shown.build)
+    assert "es.Simulation(" in source and len(source.splitlines()) <= 30
+    descriptions = []
+    for module in (shown, judged):
+        built = module.build(*arguments)
+        described = describe(built[0] if isinstance(built, tuple) else built)
+        for boundary in described["boundaries"].values():  # told by source, which differs in names
+            boundary.pop("region"), boundary.pop("value", None)
+        descriptions.append(described)
+    assert descriptions[0] == descriptions[1]
 
 
 def test_table_of_figures():

@@ -14,23 +14,12 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "atomics", "simd", "order", "checks"},
-    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
+    {"space", "linalg", "execution", "atomics", "simd", "order", "checks", "notices"},
+    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule", "summary"},
     {"operators"},
     {"scheme", "contact"},
-    {
-        "simulation",
-        "transport",
-        "diagnostics",
-        "memory",
-        "sorting",
-        "output",
-        "geometry",
-        "arguments",
-        "failure",
-        "overlap",
-        "whole",
-    },
+    {"simulation", "looks", "progress", "transport", "diagnostics", "memory", "sorting", "output", "geometry"}
+    | {"arguments", "failure", "overlap", "whole"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

@@ -16,7 +16,8 @@ from warp_eulsph.commands.frames import chosen
 from warp_eulsph.output import Recording, Run, record
 from warp_eulsph.output.export import export
 from warp_eulsph.pictures import Picture, film, picture, quantity
-from warp_eulsph.pictures.cells import corners, spacing
+from warp_eulsph.pictures.cells import corners, rim, spacing
+from warp_eulsph.pictures.draw import suited
 
 CASES = Path(__file__).parents[1] / "examples" / "cases"
 NAMES = {1: "bar", 2: "spinning_plate", 3: "twisting_column"}
@@ -277,8 +278,29 @@ def test_xdmf_in_vtk(run):
             np.testing.assert_array_equal(values.reshape(len(values), -1)[:, : expected.shape[1]], expected)
 
 
+def test_pvd_and_vtu_in_pyvista(run, tmp_path):
+    """Every time with its fields, exact; a .vtu alone too, of one frame only."""
+    import pyvista
+
+    reader = pyvista.get_reader(export(list(run), tmp_path / "a.pvd", ["velocity", "J", "deformation_gradient"]))
+    assert reader.time_values == [frame.time for frame in run]
+    for k, frame in enumerate(run):
+        reader.set_active_time_point(k)
+        data, dim = reader.read()[0], frame.x.shape[1]
+        np.testing.assert_array_equal(data.points[:, :dim], frame.x)
+        np.testing.assert_array_equal(data["velocity"][:, :dim], frame.v)
+        np.testing.assert_array_equal(data["J"], frame["J"])
+        np.testing.assert_array_equal(data["deformation_gradient"].reshape(-1, 3, 3)[:, :dim, :dim], frame.F)
+        assert data.n_cells == data.n_points == len(frame.x)
+    single = pyvista.read(export([run[-1]], tmp_path / "b.vtu"))
+    np.testing.assert_array_equal(single["cauchy_stress"], run[-1].cauchy_stress.reshape(-1, 9))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "a.pvd", "b.vtu"]
+    with pytest.raises(ValueError, match=r"a \.vtu holds one frame, got 4; choose one"):
+        export(list(run), tmp_path / "c.vtu")
+
+
 def test_bad_exports_are_named(run, tmp_path):
-    with pytest.raises(ValueError, match=r"ending must be one of .vtkhdf, .xdmf, .csv, .npz, got '.txt'"):
+    with pytest.raises(ValueError, match=r"ending must be one of .vtkhdf, .xdmf, .vtu, .pvd, .csv, .npz, got '.txt'"):
         export(list(run), tmp_path / "a.txt")
     with pytest.raises(ValueError, match=r"fields must be among \['J'.*got \['speed'\]"):
         export(list(run), tmp_path / "a.npz", ["speed"])
@@ -346,3 +368,48 @@ def test_schema_command_prints_the_schema(capsys):
 
     assert main(["schema"]) == 0
     assert json.loads(capsys.readouterr().out)["$defs"]["Case"]["properties"]["until"]["description"] == "end time [s]"
+
+
+# what a picture looks like
+
+
+def test_no_cracks_between_cells_and_a_page_that_suits(tmp_path):
+    """A sheared and jittered block: no pixel within it is the page's white."""
+    simulation = plate()
+    rng = np.random.default_rng(1)
+    F = simulation.F + 0.03 * rng.uniform(-1, 1, simulation.F.shape)
+    simulation.stepper.U.F.assign(simulation.order.by_place(F))
+    simulation.run(0.0, output=tmp_path / "run")
+    frame = Run(tmp_path / "run")[-1]
+    shown = image(picture(frame, tmp_path / "a.png", Picture(field="J")))
+    coloured = (shown.astype(int).max(axis=2) - shown.min(axis=2)) > 30
+    rows, columns = np.flatnonzero(coloured[:, : 2 * shown.shape[1] // 3].any(axis=1)), coloured[:, :].any(axis=0)
+    left = np.flatnonzero(columns)[0]
+    right = left + np.flatnonzero(~columns[left:])[0]
+    middle = shown[rows[0] + 30 : rows[-1] - 30, left + 30 : right - 30]
+    assert middle[..., 0].size > 50_000 and middle.min(axis=2).max() < 180  # white has all three colours
+
+
+@pytest.mark.parametrize(
+    ("sides", "expected"), [((1.0, 6.0), (380, 700)), ((1.0, 1.0), (800, 700)), ((10.0, 1.0), (1100, 300))]
+)
+def test_pages_are_upright_for_columns_and_flat_for_beams(sides, expected):
+    assert suited(np.array([[0.0, 0.0], sides])) == expected
+
+
+def test_title_and_first_outline(run, tmp_path):
+    plain, titled = (Picture(size=(400, 300), title=title) for title in ("", "Title"))
+    first, second = (
+        image(picture(run[-1], tmp_path / "a.png", plain)),
+        image(picture(run[-1], tmp_path / "b.png", titled)),
+    )
+    assert (first != second).any()
+    start = run[0].x.astype(float)
+    rims = rim(start)
+    if start.shape[1] != 2:
+        assert rims is None
+        return
+    side = np.sqrt(len(start))
+    assert len(rims) == 4 * side - 4  # the outermost layer of a square lattice
+    outlined = image(picture(run[-1], tmp_path / "c.png", Picture(size=(400, 300), outline=rims)))
+    assert (outlined != first).any()

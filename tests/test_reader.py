@@ -66,6 +66,10 @@ def test_derived_fields(directory):
     assert frame.principal_stresses.sum(axis=1) == pytest.approx(-3 * frame.pressure, rel=1e-9)
     C = np.einsum("nki,nkj->nij", frame.F, frame.F)
     assert frame.green_lagrange == pytest.approx(0.5 * (C - np.eye(2)), abs=1e-14)
+    F = np.zeros((36, 3, 3))
+    F[:, :2, :2], F[:, 2, 2] = frame.F, 1.0
+    assert frame.first_piola @ F.transpose(0, 2, 1) == pytest.approx(frame.J[:, None, None] * s, rel=1e-6, abs=1.0)
+    assert Run(directory).displacement(-1) == pytest.approx(frame.x - Run(directory)[0].x, abs=0)
 
 
 def test_some_fields_only(tmp_path):
@@ -73,7 +77,7 @@ def test_some_fields_only(tmp_path):
     run = Run(tmp_path)
     assert run.fields == [
         *("x", "cauchy_stress", "deformation_gradient"),
-        *("von_mises", "principal_stresses", "principal_stretches", "green_lagrange"),
+        *("von_mises", "principal_stresses", "principal_stretches", "green_lagrange", "first_piola"),
     ]
     assert pytest.approx(np.linalg.det(run[-1].F), rel=1e-6) == run[-1].J
     assert run[-1].pressure.shape == (36,)

@@ -14,6 +14,7 @@ from .boundaries import (
     BodyForce,
     Boundary,
     Fixed,
+    Gravity,
     MirrorGhosts,
     Motion,
     Pressure,
@@ -35,6 +36,7 @@ from .materials import (
     SaintVenantKirchhoff,
     TaitLiquid,
 )
+from .notices import sum_up_compiling
 from .operators.values import Linear, Shepard
 from .order import spatial_order
 from .scheme.arrangement import Arrangement, Convected, Current
@@ -73,6 +75,7 @@ __all__ = [
     "Every",
     "Fixed",
     "FluxCorrectedTransport",
+    "Gravity",
     "Lax",
     "LaxWendroff",
     "Linear",
@@ -120,3 +123,5 @@ __all__ = [
     "mirror",
     "spatial_order",
 ]
+
+sum_up_compiling()

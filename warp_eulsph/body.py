@@ -7,6 +7,7 @@ import numpy as np
 
 from .checks import real_array, spread
 from .materials import Material
+from .summary import Rows, as_html, as_text, extent, mass_unit, spread
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,6 +66,24 @@ class Body:
         kept = np.array(values)
         kept.setflags(write=False)
         object.__setattr__(self, name, kept)
+
+    def _summary(self) -> tuple[str, Rows]:
+        n, dim = self.x.shape
+        mass = self.material.density * self.volume.sum()
+        return f"Body {self.name!r}: {n} particles, {dim}-D", [
+            ("material", repr(self.material)),
+            ("extent", extent(self.x)),
+            ("spacing", spread(self.spacing, "m")),
+            ("mass", f"{mass:.6g} {mass_unit(dim)}"),
+            ("speed", spread(np.linalg.norm(self.velocity, axis=1), "m/s")),
+            ("surface", "of the arrangement" if self.surface is None else "given"),
+        ]
+
+    def __repr__(self) -> str:
+        return as_text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._summary())
 
     def _field(self, name: str, given: Any, shape: tuple[int, ...], positive: bool = False) -> np.ndarray:
         who = f"body {self.name!r}: {name}"

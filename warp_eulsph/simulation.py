@@ -14,8 +14,10 @@ from .diagnostics import Diagnostics
 from .execution import graphs
 from .failure import failure, where
 from .fields import allocate
+from .looks import Looks
 from .memory import check_memory
 from .order import Order
+from .progress import Bar
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.arrangement import Arrangement, Convected
 from .scheme.flux import Flux, check_reference
@@ -34,7 +36,7 @@ from .whole import Whole
 STEPS_BETWEEN_LOOKS = 8
 
 
-class Simulation:
+class Simulation(Looks):
     """Runs bodies under conditions with one scheme.
 
     Args:
@@ -131,11 +133,14 @@ class Simulation:
         self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self.whole = Whole()
+        self.watch: Bar | None = None  # shows how far a run is
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
 
     # what a run does
 
-    def run(self, until: float, *, every: float | None = None, output: Any = None) -> None:
+    def run(
+        self, until: float, *, every: float | None = None, output: Any = None, progress: bool | None = None
+    ) -> None:
         """Step to the time ``until`` [s], which is hit exactly.
 
         Args:
@@ -143,6 +148,7 @@ class Simulation:
             every: time between frames [s]; the first frame is the present state, the last the end.
             output: directory of the run, which can be resumed (``output.record``); what it held moves to ``abandoned/``
                 there. Or an object with ``write(simulation)``, asked once per frame.
+            progress: whether a bar is shown; on a terminal and in a notebook if None.
 
         Raises:
             UnstableError: det F ≤ 0 or non-finite values; the last good frame stays on disk.
@@ -153,17 +159,18 @@ class Simulation:
         if not (np.isfinite(real_number(until, "until")) and until >= self.t):
             raise ValueError(f"until must be finite and not before the present time {self.t} s, got {until}")
         frames = AtTimes() if every is None else EveryTime(every, self.t)
-        if output is None:
-            self._advance(until)
-        elif hasattr(output, "write"):
-            self.output = output
-            output.write(self)
-            for _ in self.frames(targets(frames, self.t, until)):
+        with Bar(self, until, progress) as self.watch:
+            if output is None:
+                self._advance(until)
+            elif hasattr(output, "write"):
+                self.output = output
                 output.write(self)
-        else:
-            from .output import Recording, record
+                for _ in self.frames(targets(frames, self.t, until)):
+                    output.write(self)
+            else:
+                from .output import Recording, record
 
-            record(self, output, until, Recording(snapshots=frames), replace=True)
+                record(self, output, until, Recording(snapshots=frames), replace=True, watch=self.watch)
 
     def frames(self, times: Iterable[float]) -> Iterator[float]:
         """Step through increasing ``times`` [s], yielding each when it is reached exactly."""
@@ -192,6 +199,8 @@ class Simulation:
         self.clock.aim(until)
         while self.t < until:
             self._take_steps(None)
+            if self.watch is not None:
+                self.watch(self)
 
     def _take_steps(self, most: int | None) -> None:
         self.whole.check()
@@ -274,11 +283,6 @@ class Simulation:
     def configuration(self) -> Configuration:
         """The configuration in which weights live now."""
         return self.stepper.configuration
-
-    @property
-    def X(self) -> np.ndarray:
-        """Initial positions [m], (n, dim)."""
-        return np.concatenate([body.x for body in self.bodies])
 
     @property
     def x(self) -> np.ndarray:

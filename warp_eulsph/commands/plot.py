@@ -27,10 +27,10 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--limits", type=_numbers(2), metavar="LOW,HIGH", help="range of the colours; default all of it"
     )
     parser.add_argument("--colours", default="viridis", help="colour map of matplotlib; default %(default)s")
-    parser.add_argument(
-        "--size", type=_numbers(2, int), default=(1000, 700), metavar="W,H", help="pixels; default 1000,700"
-    )
+    parser.add_argument("--size", type=_numbers(2, int), metavar="W,H", help="pixels; default those that suit the body")
     parser.add_argument("--view", type=_numbers(3), metavar="X,Y,Z", help="where 3-D is looked at from; y points up")
+    parser.add_argument("--title", help="stands before the time; default the title of the case")
+    parser.add_argument("--undeformed", action="store_true", help="dots where the outermost particles started, in 2-D")
     parser.add_argument("--fps", type=float, default=10.0, help="frames per second of a film; default %(default)s")
     parser.set_defaults(run_command=run)
 
@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Draw; 0, or 2 when it cannot be."""
     from ..output import Run
     from ..pictures import Picture, default_field, film, picture
-    from ..pictures.cells import spacing
+    from ..pictures.cells import rim, spacing
 
     try:
         single = arguments.output.endswith(".png")
@@ -56,6 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
             colours=arguments.colours,
             limits=arguments.limits,
             spacing=spacing(found[0].x),
+            title=found.title if arguments.title is None else arguments.title,
+            outline=rim(found[0].x) if arguments.undeformed else None,
             **view,
         )
         if single:

@@ -15,10 +15,7 @@ DONE, FAILED, BAD_INPUT, UNSTABLE, STOPPED = 0, 1, 2, 3, 75
 
 
 def start_logging() -> None:
-    """Messages of the package to standard error, and of Warp only warnings."""
-    import warp as wp
-
-    wp.config.log_level = wp.LOG_WARNING
+    """Messages of the package to standard error; of Warp only warnings, and the line that kernels are compiled."""
     logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stderr)
 
 

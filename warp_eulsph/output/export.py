@@ -1,4 +1,4 @@
-"""A run's snapshots as one file for other programs: VTKHDF, XDMF, CSV, NPZ."""
+"""A run's snapshots as one file for other programs: VTKHDF, XDMF, VTU, CSV, NPZ."""
 
 import itertools
 import os
@@ -13,6 +13,7 @@ import numpy as np
 from .reader import RunFrame
 from .snapshot import read_snapshot
 from .temporal import write_layout
+from .vtu import write_pvd, write_vtu
 
 AXES = "xyz"
 _BLOCK = 10_000  # rows of a table that are made text at once
@@ -22,8 +23,9 @@ def export(frames: Sequence[RunFrame], target: str | PathLike, fields: Sequence[
     """Write ``target``, in the format that its ending says; the path of it. It appears whole or not at all.
 
     ``.vtkhdf``: one file with all times (ParaView 5.12, VTK 9.3). ``.xdmf``: a small file that refers to the snapshots,
-    which must stay where they are. ``.csv``: a row per particle and time, a column per component. ``.npz``: numpy
-    arrays ``time``, ``step``, ``x`` and the fields, the first axis the time.
+    which must stay where they are. ``.vtu``: one frame, ``.pvd``: a ``.vtu`` for each in a folder beside it; both need
+    PyVista. ``.csv``: a row per particle and time, a column per component. ``.npz``: numpy arrays ``time``, ``step``,
+    ``x`` and the fields, the first axis the time.
 
     Args:
         frames: of a run, in order; of equal numbers of particles for ``.npz``.
@@ -32,6 +34,7 @@ def export(frames: Sequence[RunFrame], target: str | PathLike, fields: Sequence[
 
     Raises:
         ValueError: unknown ending or field, or numbers of particles that change.
+        ModuleNotFoundError: PyVista is not installed.
         OSError: a snapshot is not there, or the disk refused.
     """
     path = Path(target)
@@ -168,4 +171,11 @@ def _append(group: Any, name: str, source: Any) -> None:
 
 Writer = Callable[[Path, Path, list[Path], list[str]], None]
 #: Ending of a file -> what writes it.
-FORMATS: dict[str, Writer] = {".vtkhdf": _write_vtkhdf, ".xdmf": _write_xdmf, ".csv": _write_csv, ".npz": _write_npz}
+FORMATS: dict[str, Writer] = {
+    ".vtkhdf": _write_vtkhdf,
+    ".xdmf": _write_xdmf,
+    ".vtu": write_vtu,
+    ".pvd": write_pvd,
+    ".csv": _write_csv,
+    ".npz": _write_npz,
+}

@@ -69,5 +69,5 @@ def _components(name: str, shape: tuple[int, ...]) -> tuple[str, ...]:
     """Names of the dimensions beside time and particle."""
     if name.startswith("principal"):
         return (f"{name}_order",)
-    axis = "stress_axis" if name == "cauchy_stress" else "axis"
+    axis = "stress_axis" if name in ("cauchy_stress", "first_piola") else "axis"
     return (axis, f"{axis}_2")[: len(shape)]

@@ -16,6 +16,7 @@ from .manifest import Entry, Manifest
 from .shape_functions import shape_functions
 from .snapshot import read_field, read_units
 from .tables import read_table
+from .tensors import padded
 
 if TYPE_CHECKING:
     import xarray
@@ -26,6 +27,7 @@ DERIVED = {
     "principal_stresses": "Pa",
     "principal_stretches": "-",
     "green_lagrange": "-",
+    "first_piola": "Pa",
 }
 
 #: What ``RunFrame.interpolate`` needs of the snapshots besides the field itself.
@@ -128,6 +130,12 @@ class RunFrame:
         """Green-Lagrange strain ½ (FᵀF − I) [-], (N, dim, dim)."""
         F = self.F.astype(float)
         return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(F.shape[1]))
+
+    @property
+    def first_piola(self) -> np.ndarray:
+        """First Piola–Kirchhoff stresses J σ F⁻ᵀ, force per initial area [Pa], (N, 3, 3); missing stretches are 1."""
+        F = padded(self.F.astype(float), 1.0)
+        return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)
 
     @property
     def particles(self) -> np.ndarray:
@@ -277,14 +285,26 @@ class Run(Sequence[RunFrame]):
     def fields(self) -> list[str]:
         """Names of the fields in the first snapshot, and of those derived from them."""
         held = list(self[0].units) if len(self) else []
-        needs = {name: "cauchy_stress" if unit == "Pa" else "deformation_gradient" for name, unit in DERIVED.items()}
-        return held + [name for name, need in needs.items() if need in held]
+        needs = {name: {"cauchy_stress" if unit == "Pa" else "deformation_gradient"} for name, unit in DERIVED.items()}
+        needs["first_piola"] = {"cauchy_stress", "deformation_gradient"}
+        return held + [name for name, need in needs.items() if need <= set(held)]
 
     @property
     def units(self) -> dict[str, str]:
         """SI units of the fields, by name."""
         held = self[0].units if len(self) else {}
         return {name: held.get(name) or DERIVED[name] for name in self.fields}
+
+    def displacement(self, index: int) -> np.ndarray:
+        """Displacements of frame ``index`` since the first one [m], (N, dim).
+
+        Raises:
+            ValueError: the frame has other particles than the first.
+        """
+        first, frame = self[0], self[index]
+        if not np.array_equal(first.particles, frame.particles):
+            raise ValueError(f"frame {index} must have the particles of the first, got {frame.N} and {first.N}")
+        return frame.x - first.x
 
     @cached_property
     def log(self) -> dict[str, np.ndarray]:
@@ -305,6 +325,14 @@ class Run(Sequence[RunFrame]):
     def description(self) -> dict[str, Any]:
         """What was run: ``simulation``, ``recording``, ``until`` [s], ``case``."""
         return self.directory.read(self.directory.description)
+
+    @property
+    def title(self) -> str:
+        """Of the case that was run; empty if it has none."""
+        try:
+            return str(self.description.get("case", {}).get("title") or "")
+        except OSError:  # snapshots alone have no description
+            return ""
 
     @property
     def environment(self) -> dict[str, Any]:

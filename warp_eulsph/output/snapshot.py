@@ -15,7 +15,7 @@ from ..fields import STATE
 from .atomic import replace_file
 from .copies import Copies, Copy
 from .fields import SOURCES, Recorded, SnapshotField, chosen_fields
-from .stress import padded
+from .tensors import padded
 
 
 @dataclass(frozen=True)

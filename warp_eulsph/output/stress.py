@@ -12,15 +12,6 @@ from ..simulation import Simulation
 from ..space import Space, matrix_type
 
 
-def padded(tensors: np.ndarray, diagonal: float) -> np.ndarray:
-    """Tensors (n, dim, dim) as (n, 3, 3), with ``diagonal`` on the missing part of the diagonal."""
-    n, dim = tensors.shape[:2]
-    full = np.zeros((n, 3, 3), dtype=tensors.dtype)
-    full[:, range(dim, 3), range(dim, 3)] = diagonal
-    full[:, :dim, :dim] = tensors
-    return full
-
-
 @functools.cache
 def _make_cauchy(space: Space, full: Space, law: Law) -> Any:
     """Kernel: σ of F in the space of the simulation, by a law in ``full`` dimensions with missing stretches of one."""

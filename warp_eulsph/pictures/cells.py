@@ -19,6 +19,18 @@ def spacing(x: np.ndarray) -> float:
     return float(np.median(found))
 
 
+def rim(x: np.ndarray) -> np.ndarray | None:
+    """Positions of the outermost particles [m], (k, 2): those with fewer than three quarters of the most neighbours
+    within 1.8 spacings; None but in 2-D."""
+    if x.shape[1] != 2:
+        return None
+    near = (1.8 * spacing(x)) ** 2
+    # Blocks, because all distances at once take n² numbers
+    blocks = np.array_split(x, max(1, len(x) // 256))
+    counts = np.concatenate([(np.square(b[:, None] - x).sum(axis=-1) < near).sum(axis=1) for b in blocks])
+    return x[counts < 0.75 * counts.max()]
+
+
 def corners(frame: RunFrame, size: float) -> np.ndarray:
     """Corners of each particle's cell [m], (n, 2^dim, dim): x_a + F_a c with c those of a cube that holds its volume.
 

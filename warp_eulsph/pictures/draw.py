@@ -15,7 +15,7 @@ import numpy as np
 from ..output import Run
 from ..output.reader import RunFrame
 from .cells import spacing
-from .plane import draw_line, draw_plane
+from .plane import LONG, draw_line, draw_plane
 from .quantity import quantity
 from .volume import draw_volume
 
@@ -28,7 +28,9 @@ class Picture:
 
     Args:
         field: what colours the particles (see ``quantity``).
-        size: width and height in pixels, even numbers for films.
+        size: width and height in pixels, even numbers for films; those that suit the extent if None.
+        title: stands before the time.
+        outline: positions of the outermost particles at the start [m], (k, 2), dotted beneath the body; in 2-D only.
         colours: a colour map of matplotlib.
         limits: least and largest value of the colours; those shown if None.
         spacing: edge of the cells at the start [m]; by default the spacing of the first frame that is drawn.
@@ -37,7 +39,9 @@ class Picture:
     """
 
     field: str = "velocity"
-    size: tuple[int, int] = (1000, 700)
+    size: tuple[int, int] | None = None
+    title: str = ""
+    outline: np.ndarray | None = None
     colours: str = "viridis"
     limits: tuple[float, float] | None = None
     spacing: float | None = None
@@ -45,7 +49,7 @@ class Picture:
     view: tuple[float, float, float] = (0.6, 0.45, 1.0)
 
     def __post_init__(self) -> None:
-        if not all(100 <= side <= 10_000 for side in self.size):
+        if self.size is not None and not all(100 <= side <= 10_000 for side in self.size):
             raise ValueError(f"size must be 100 to 10000 pixels each way, got {self.size}")
         if self.limits is not None and not self.limits[0] < self.limits[1]:
             raise ValueError(f"limits must be a least and a larger value, got {self.limits}")
@@ -132,7 +136,20 @@ def fitted(options: Picture, frames: Iterable[RunFrame]) -> Picture:
     if limits is None and np.isfinite(least) and np.isfinite(largest):
         wide = largest - least > 1e-12 * max(abs(least), abs(largest))
         limits = (least, largest) if wide else (least - 0.5, largest + 0.5)
-    return replace(options, spacing=edge, limits=limits, extent=extent)
+    size = suited(extent) if options.size is None else options.size
+    return replace(options, spacing=edge, limits=limits, extent=extent, size=size)
+
+
+def suited(extent: np.ndarray) -> tuple[int, int]:
+    """Pixels of a page without an empty half: upright for columns, flat for beams; even numbers."""
+    if extent.shape[1] != 2:
+        return 1000, 700
+    wide, high = extent[1] - extent[0]
+    if wide > LONG * high:  # the colour bar lies beneath
+        width, height = 1100.0, 200.0 + 1000.0 * high / wide
+    else:
+        width, height = 200.0 + 600.0 * wide / high, 700.0
+    return 2 * round(max(width, 380.0) / 2.0), 2 * round(max(height, 260.0) / 2.0)
 
 
 def _pillow() -> Any:

@@ -8,6 +8,11 @@ from ..output.reader import RunFrame
 from .cells import corners
 from .quantity import quantity
 
+# Beneath the cells they are drawn larger by this factor, which fills the cracks between those that deformed differently
+# and those that smoothed edges leave.
+OVERLAP = 1.15
+# A body longer than this many times its height has its colour bar beneath.
+LONG = 2.0
 # Corners of a cell in the order of its outline.
 OUTLINE = [0, 1, 3, 2]
 
@@ -38,7 +43,7 @@ def draw_line(frame: RunFrame, options: Any) -> np.ndarray:
     if shown.exact is not None:
         axes.plot(frame.x[order, 0], shown.exact[order], "k:", lw=1, label="exact")
         axes.legend(loc="upper right")
-    axes.set(xlabel="x [m]", ylabel=shown.label, title=_title(frame))
+    axes.set(xlabel="x [m]", ylabel=shown.label, title=_title(frame, options))
     if options.limits is not None:
         axes.set_ylim(*_widened(options.limits))
     if options.extent is not None:
@@ -54,22 +59,27 @@ def draw_plane(frame: RunFrame, options: Any) -> np.ndarray:
 
     shown = quantity(frame, options.field)
     axes = figure.add_subplot()
-    outlines: Any = corners(frame, options.spacing)[:, OUTLINE]
-    cells = PolyCollection(outlines, array=shown.values, cmap=options.colours)
+    centres, own = frame.x.astype(float)[:, None], corners(frame, options.spacing)
+    outlines: Any = np.concatenate([centres + OVERLAP * (own - centres), own])[:, OUTLINE]
+    cells = PolyCollection(outlines, array=np.tile(shown.values, 2), cmap=options.colours)
     cells.set(edgecolor="face", linewidth=0.2)
     if options.limits is not None:
         cells.set_clim(*options.limits)
     axes.add_collection(cells)
+    if options.outline is not None:
+        axes.plot(*options.outline.T, ".", ms=1.5, color="0.6", zorder=0)
     extent = options.extent
     axes.set(xlim=extent[:, 0], ylim=extent[:, 1], aspect="equal", xlabel="x [m]", ylabel="y [m]")
-    axes.set_title(_title(frame))
-    bar = figure.colorbar(cells, label=shown.label)
+    axes.set_title(_title(frame, options))
+    wide, high = extent[1] - extent[0]
+    place = "bottom" if wide > LONG * high else "right"
+    bar = figure.colorbar(cells, label=shown.label, location=place, shrink=0.8, pad=0.02)
     bar.formatter.set_powerlimits((-3, 4))
     return _image(figure)
 
 
-def _title(frame: RunFrame) -> str:
-    return f"t = {frame.time:.6g} s"
+def _title(frame: RunFrame, options: Any) -> str:
+    return f"{options.title}{', ' if options.title else ''}t = {frame.time:.6g} s"
 
 
 def _widened(limits: tuple[float, float]) -> tuple[float, float]:

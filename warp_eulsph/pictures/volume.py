@@ -40,9 +40,14 @@ def draw_volume(frame: RunFrame, options: Any) -> np.ndarray:
         bar = {"title": " ", "color": "black", "vertical": True, "position_x": 0.86, "position_y": 0.2}
         bar |= {"height": 0.6, "width": 0.08, "title_font_size": 16, "label_font_size": 14, "n_labels": 5}
         look = {"scalars": "colour", "cmap": options.colours, "clim": options.limits, "ambient": 0.3}
+        look |= {"show_edges": True, "edge_color": "black", "edge_opacity": 0.25, "line_width": 1}
         plotter.add_mesh(cells, scalar_bar_args=bar, **look)
         plotter.add_axes(color="black")
-        plotter.add_text(f"{shown.label}\nt = {frame.time:.6g} s", color="black", font_size=10)
+        plotter.add_text(
+            "\n".join(filter(None, (options.title, shown.label, f"t = {frame.time:.6g} s"))),
+            color="black",
+            font_size=10,
+        )
         low, high = options.extent
         centre, reach = 0.5 * (low + high), float(np.linalg.norm(high - low))
         away = np.array(options.view) / np.linalg.norm(options.view)

@@ -12,8 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import warp as wp
-
 from ..output import Figure, table
 from . import case as registry
 from .case import Case
@@ -75,7 +73,6 @@ def validate(names: Sequence[str], *, quick: bool = False, as_json: bool = False
         for case in chosen:
             print(f"{case.name}\n    {case.title}\n    reference: {case.source}")
         return 0
-    wp.config.log_level = wp.LOG_WARNING
     outcomes = []
     for case in chosen:
         with _nothing_on_stdout():

@@ -1,0 +1,99 @@
+"""What a simulation shows of itself besides its state: fields made from it, and a short table."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .summary import Rows, as_html, as_text, extent
+
+if TYPE_CHECKING:
+    from .order import Order
+    from .space import Space
+
+#: Forces of ``fields.FORCES`` that move a particle, those of the conditions among them.
+ALL_FORCES = ("internal", "correction", "dissipation", "external", "reaction")
+
+
+class Looks:
+    """Fields of a ``Simulation`` in the order of the bodies' particles, copies on the host, and how it is shown."""
+
+    bodies: list[Any]
+    boundaries: tuple[Any, ...]
+    space: "Space"
+    order: "Order"
+    device: Any
+    stepper: Any
+    particles: Any
+
+    @property
+    def X(self) -> np.ndarray:
+        """Initial positions [m], (n, dim)."""
+        return np.concatenate([body.x for body in self.bodies])
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacements x − X since the start [m], (n, dim)."""
+        return self.x - self.X
+
+    @property
+    def cauchy_stress(self) -> np.ndarray:
+        """Cauchy stresses σ [Pa], (n, 3, 3) in any dimension: σ33 of plane strain counts; of a bar σ11 only."""
+        from .output.stress import cauchy_stress
+
+        simulation: Any = self
+        return cauchy_stress(simulation)
+
+    @property
+    def first_piola(self) -> np.ndarray:
+        """First Piola–Kirchhoff stresses P = J σ F⁻ᵀ, force per initial area [Pa], (n, 3, 3); missing stretches are 1.
+
+        F is the one the material carries: of a liquid its volume only.
+        """
+        from .output.tensors import padded
+
+        F = padded(self.F, 1.0)
+        return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)
+
+    @property
+    def strain_energy_density(self) -> np.ndarray:
+        """Stored energy per initial volume Ψ [J/m³], (n,)."""
+        flux, F = self.stepper.flux, self.stepper.U.F
+        stored = wp.empty(len(F), dtype=wp.float64, device=self.device)
+        flux.energy(F, stored)
+        return self.order.by_number(stored.numpy() / self.particles.V0.numpy())
+
+    @property
+    def force(self) -> np.ndarray:
+        """Forces on the particles in the last step, all together [N], (n, dim): N/m in 2-D, N/m² in 1-D.
+
+        From the material, from dissipation, loads and conditions. Zero before the first step.
+        """
+        parts = [getattr(self.stepper.forces, name) for name in ALL_FORCES]
+        return self.order.by_number(sum(part.numpy() for part in parts if len(part)))
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Accelerations, ``force`` over mass [m/s²], (n, dim)."""
+        return self.force / self.order.by_number(self.particles.mass.numpy())[:, None]
+
+    def _summary(self) -> tuple[str, Rows]:
+        dim, particles = self.space.dim, f"{len(self.X)} particles"
+        names = ", ".join(f"{body.name!r} ({len(body.x)} of {type(body.material).__name__})" for body in self.bodies)
+        conditions = ", ".join(type(boundary).__name__ for boundary in self.boundaries) or "none"
+        extrema, energy = self.extrema(), self.energy()
+        return f"Simulation: {particles}, {dim}-D, {self.space.real.__name__} on {self.device}", [
+            ("bodies", names),
+            ("conditions", conditions),
+            ("time", f"{self.t:.6g} s, step {self.steps}, last one {self.dt:.4g} s"),
+            ("extent", extent(self.x)),
+            ("volume ratio", f"{extrema['least J']:.4g} … {extrema['largest J']:.4g}"),
+            ("largest speed", f"{extrema['speed']:.4g} m/s"),
+            ("energy", f"{energy['kinetic']:.4g} J kinetic + {energy['stored']:.4g} J stored"),
+        ]
+
+    def __repr__(self) -> str:
+        return as_text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._summary())
