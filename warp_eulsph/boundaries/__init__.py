@@ -2,6 +2,7 @@
 
 from .base import Assembly, Bound, Boundary, Region
 from .body_force import BodyForce
+from .clamped import Clamped
 from .mirror import Antisymmetry, MirrorGhosts, Wall, mirror
 from .motion import Motion
 from .pressure import Pressure
@@ -15,6 +16,7 @@ __all__ = [
     "BodyForce",
     "Bound",
     "Boundary",
+    "Clamped",
     "Fixed",
     "MirrorGhosts",
     "Motion",

@@ -26,6 +26,7 @@ class Assembly:
         particles: struct ``Particles``.
         bodies: name of a body -> its range of particle indices.
         order: gives arrays of places for indices, for particles move in memory (see ``Bound.sortable``).
+        surface_given: the bodies came with their area vectors.
     """
 
     space: Space
@@ -34,6 +35,7 @@ class Assembly:
     particles: Any
     bodies: dict[str, range]
     order: Order
+    surface_given: bool = False
 
     def select(self, region: Region | None, body: str | None, who: str) -> np.ndarray:
         """Sorted indices of the region's particles, (k,) int32.
