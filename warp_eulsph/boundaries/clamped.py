@@ -94,7 +94,7 @@ class BoundClamped(Bound):
             least = np.abs(self._distance[held]).min()
             raise ValueError(
                 f"Clamped: the plane must lie within {NEAR} spacings of the outermost particles, the nearest particle "
-                f"is {least:.6g} m away; move the point to the face of the body, half a spacing outside of its particles"
+                f"is {least:.6g} m away; move the point to the face of the body, half a spacing outside of them"
             )
         self._tops = held[near]
         behind = self._distance[held] < -0.55 * self._spacing[held]
@@ -104,7 +104,9 @@ class BoundClamped(Bound):
                 f"Clamped: the plane must close the body, got {behind.sum()} particles more than half a spacing behind "
                 f"it, the first at {assembly.X[first]} m; limit the region, or hold what lies inside by Fixed"
             )
-        deep = self._distance < (DEPTH + NEAR) * self._spacing  # more than it will be, until area vectors are known
+        # more than it will be, until area vectors are known
+        deep = (self._distance > -NEAR * self._spacing) & (self._distance < (DEPTH + NEAR) * self._spacing)
+        self._start: wp.array | None = None
         self.indices = np.union1d(self._tops, np.flatnonzero(deep)).astype(np.int32)
 
     def start(self, state: Any) -> None:
@@ -120,7 +122,7 @@ class BoundClamped(Bound):
         self.impose(state, None, 0.0)
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
-        if hasattr(self, "_start"):  # not yet when the initial velocities are imposed before area vectors are known
+        if self._start is not None:  # initial velocities are imposed before area vectors are known, and again after
             arguments = [self._start, self._places, self._weights, self.mass, state.v]
             wp.launch(_make_hold(self.space), len(self._start) - 1, arguments, device=self.device)
 

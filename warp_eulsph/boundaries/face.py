@@ -17,12 +17,14 @@ log = logging.getLogger(__name__)
 SCATTER, CERTAIN = 0.2, 4.0
 # Largest change from the sum of the area vectors to that of the cells that is believed.
 LARGEST_CHANGE = 0.4
-# Depths beneath which the area vectors of a face in a lattice have ended, and nearly: less than a part of a face.
-ENDED, NEARLY, QUIET = 3.9, 2.9, 0.02
+# Depth beneath which the area vectors of a face in a lattice have ended: less than this part of a particle's face.
+ENDED, QUIET = 3.9, 0.02
 # Range of the heights of the outermost particles of a flat face: of one layer, jittered at most, and of two at most.
 EVEN, ROUGH = 0.45, 0.8
-# Cosine between the normal and the area vector of a surface particle above which it belongs to a curved face.
-LEAST_SLOPE = 0.1
+# Part of the outermost particles of a flat face that may lie at steps of a layer or two.
+STEPPED = 0.25
+# How far, by its cosine, a particle of a curved surface may look away from a normal and still belong to what faces it.
+RIM_SLOPE = 0.3
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,11 @@ def find_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Fac
         ValueError: the region holds no particle of a face along ``n``.
     """
     tops = outermost(body, n)
-    skin = tops if body.exact else surface_particles(body)
-    roughness = 0.0 if body.exact else roughness_of(body, tops, skin, n, chosen)
+    roughness = 0.0 if body.exact else roughness_of(body, tops, n, chosen)
     flat = roughness < ROUGH
-    if not flat:
-        tops = skin[along(body, skin) @ n > LEAST_SLOPE]
+    if not flat and chosen[tops].any():
+        # those of the rim that look away a little have their share of the area vectors beneath the rim
+        tops, bottoms = sloping(body, n, -RIM_SLOPE), sloping(body, -n, RIM_SLOPE)
     held = chosen[tops]
     if not held.any():
         raise ValueError(
@@ -78,13 +80,13 @@ def find_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Fac
         _, height = column(body, outermost(body, -n), -n)
     else:
         above, depth = nearest(body, tops)
-        _, height = nearest(body, skin[along(body, skin) @ n < -LEAST_SLOPE])
+        _, height = nearest(body, bottoms)
     _warn_if_unclear(body, chosen, tops, held, above, depth, n, who)
     number = np.cumsum(held) - 1
     members = np.flatnonzero((above >= 0) & held[above] & (depth <= height + 1e-6 * body.spacing))
     columns, areas = number[above[members]], body.s[members] @ n
     of_cells = _area_of_cells(body, kept, tops, n) if roughness < EVEN else None
-    if of_cells is not None and not _right_by_itself(body, members, areas, depth, of_cells):
+    if of_cells is not None and not _ends(body, Face(members, columns, areas, kept), depth, of_cells):
         area = areas.sum()
         if area > 0.0 and abs(of_cells / area - 1.0) < LARGEST_CHANGE:
             areas *= of_cells / area
@@ -94,33 +96,43 @@ def find_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Fac
     return Face(members, columns, areas, kept)
 
 
-def _right_by_itself(body: Surface, members: np.ndarray, areas: np.ndarray, depth: np.ndarray, of_cells: float) -> bool:
+def _ends(body: Surface, face: Face, depth: np.ndarray, of_cells: float) -> bool:
     """Whether the area vectors end within the columns, as in lattices: then they sum to the face to round-off.
 
-    Where they nearly end they are believed if the cells say something else by far, as in some staggered layers.
+    Beside staggered edges some do not; there the sum is better than the cells if these say something else by far.
     """
-    size = body.V[members] ** (1.0 - 1.0 / body.x.shape[1])
-
-    def ended(beneath: float) -> bool:
-        deep = depth[members] > beneath * body.spacing
-        return bool(deep.any() and (np.abs(areas[deep]) < QUIET * size[deep]).all())
-
-    return ended(ENDED) or (ended(NEARLY) and abs(of_cells / areas.sum() - 1.0) > QUIET)
+    deep = depth[face.members] > ENDED * body.spacing
+    if len(np.unique(face.columns[deep])) < 0.9 * len(face.tops):
+        return False
+    quiet = (np.abs(face.areas[deep]) < QUIET * body.size[face.members[deep]]).mean()
+    return bool(quiet == 1.0 or (quiet > 0.35 and abs(of_cells / face.areas.sum() - 1.0) > 0.01))
 
 
-def roughness_of(body: Surface, tops: np.ndarray, skin: np.ndarray, n: np.ndarray, chosen: np.ndarray) -> float:
+def sloping(body: Surface, n: np.ndarray, least: float) -> np.ndarray:
+    """Particles on the surface whose area vectors have a cosine with ``n`` above ``least``."""
+    skin = surface_particles(body)
+    return skin[along(body, skin) @ n > least]
+
+
+def roughness_of(body: Surface, tops: np.ndarray, n: np.ndarray, chosen: np.ndarray) -> float:
     """Largest range of the heights [spacings] of neighbouring outermost particles that the region holds.
 
-    Those of a flat face lie in planes across ``n``, with high steps between them or none; inf where ``tops`` misses
-    particles that face ``n``, as on a slope.
+    Those of a flat face lie in planes across ``n``, with few steps between them. It is inf where the surface is curved:
+    where ``tops`` misses particles that face ``n``, or many lie at steps of a layer or two.
     """
     kept = tops[chosen[tops]]
-    facing = skin[chosen[skin] & (body.s[skin] @ n > 0.6 * np.linalg.norm(body.s[skin], axis=1))]
-    if not len(kept) or np.isin(facing, tops, invert=True).sum() > 0.1 * len(kept):
+    if not len(kept):
         return np.inf
-    a, b = pairs(body.x[kept], body.x[kept], 2.2 * body.spacing)
+    facing = sloping(body, n, 0.6)
+    if np.isin(facing[chosen[facing]], tops, invert=True).sum() > 0.1 * len(kept):
+        return np.inf
+    a, b = pairs(body.x[kept], body.x[kept], 3.0 * body.spacing)
     step, beside = along_and_beside(body, kept[a], kept[b], n)
-    linked = (np.linalg.norm(beside, axis=1) < 1.7) & (np.abs(step) < 0.9)
+    neighbours = np.linalg.norm(beside, axis=1) < 1.7
+    stepped = neighbours & (np.abs(step) > ROUGH) & (np.abs(step) < 2.5)
+    if len(np.unique(a[stepped])) > STEPPED * len(kept):
+        return np.inf
+    linked = neighbours & (np.abs(step) < 0.9)
     a, b = a[linked], b[linked]
     # a slope shows over the whole of a plane, not from one particle to the next
     level = np.arange(len(kept))
@@ -192,8 +204,8 @@ def _warn_if_unclear(
     if holes or uncovered > 0.25 * held.sum():
         log.warning(
             "%s: the region cuts the face along %s: it leaves out %d outermost particles between those it holds, and "
-            "holds %d particles beneath ones it leaves out; only what lies under outermost particles that it holds is "
-            "loaded; let it hold all of the face's outermost layer",
+            "holds %d particles beneath ones it leaves out; only what lies under outermost particles that it holds "
+            "counts; let it hold all of the face's outermost layer",
             who,
             row(n),
             holes,

@@ -9,10 +9,6 @@ from .outermost import Surface, along, nearest, outermost, surface_particles
 
 log = logging.getLogger(__name__)
 
-# Cosines between an area vector and the normal of a flat face: more within the face, between these at its rim. Of a
-# curved surface's outermost particles more than the part SLOPING lie elsewhere; JITTERED where the region holds one
-# layer across the normal, whose area vectors only disorder can turn.
-WITHIN, RIM, SLOPING, JITTERED = 0.95, (0.5, 0.8), 0.3, 0.6
 # Cosine within which directions are one flat face's.
 ALIKE = 0.906
 
@@ -39,7 +35,7 @@ def find_surface(body: Surface, chosen: np.ndarray, who: str) -> tuple[np.ndarra
     faces, pool = [], skin[chosen[skin]]
     while len(pool):
         n = _commonest(body, pool, skin)
-        face = None if n is None else _flat_face(body, chosen, n, skin, who)
+        face = None if n is None else _flat_face(body, chosen, n, who)
         if n is None or face is None or not np.isin(pool, face.tops).any():
             break
         faces.append((n, face))
@@ -79,14 +75,9 @@ def _commonest(body: Surface, pool: np.ndarray, skin: np.ndarray) -> np.ndarray 
     return axis if np.linalg.norm(n - axis) < 4.0 * error + 1e-9 else n
 
 
-def _flat_face(body: Surface, chosen: np.ndarray, n: np.ndarray, skin: np.ndarray, who: str) -> Face | None:
+def _flat_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Face | None:
     tops = outermost(body, n)
-    if not chosen[tops].any() or (not body.exact and roughness_of(body, tops, skin, n, chosen) >= ROUGH):
-        return None
-    slope = along(body, tops) @ n
-    elsewhere = (slope < RIM[0]) | ((slope > RIM[1]) & (slope < WITHIN))
-    layer = np.ptp(body.x[tops[chosen[tops]]] @ n) < ROUGH * body.spacing
-    if elsewhere.sum() > (JITTERED if layer else SLOPING) * len(tops) or not (slope > WITHIN).any():
+    if not chosen[tops].any() or not (body.exact or roughness_of(body, tops, n, chosen) < ROUGH):
         return None
     return find_face(body, chosen, n, who)
 
