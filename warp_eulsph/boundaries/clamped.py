@@ -15,6 +15,8 @@ from .outermost import DEPTH
 
 # Spacings between the plane and the outermost particles of the face it holds, at most.
 NEAR = 1.5
+# Sum of the areas of a column, over their mean, beneath which its weights would be those of noise.
+LEAST_SUM = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +116,7 @@ class BoundClamped(Bound):
         order = np.lexsort((face.members, face.columns))
         members, columns, areas = face.members[order], face.columns[order], face.areas[order]
         count = len(face.tops)
+        areas = _positive(columns, areas, members == face.tops[columns], count)
         weights = _exact_for_linear(columns, areas, self._distance[members] / self._spacing[members], count)
         self.indices = np.sort(members).astype(np.int32)
         self._start = wp.array(np.searchsorted(columns, np.arange(count + 1)), dtype=wp.int32, device=self.device)
@@ -125,6 +128,13 @@ class BoundClamped(Bound):
         if self._start is not None:  # initial velocities are imposed before area vectors are known, and again after
             arguments = [self._start, self._places, self._weights, self.mass, state.v]
             wp.launch(_make_hold(self.space), len(self._start) - 1, arguments, device=self.device)
+
+
+def _positive(columns: np.ndarray, areas: np.ndarray, top: np.ndarray, count: int) -> np.ndarray:
+    """The areas, (k,), all with the outermost particle where disorder leaves a column with hardly any."""
+    sums = np.bincount(columns, areas, minlength=count)
+    poor = (sums < LEAST_SUM * sums.mean())[columns]
+    return np.where(poor, top.astype(float), areas)
 
 
 def _exact_for_linear(columns: np.ndarray, areas: np.ndarray, d: np.ndarray, count: int) -> np.ndarray:
