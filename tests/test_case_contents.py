@@ -18,12 +18,15 @@ def test_motion_and_traction_and_mirror_from_a_file():
                 {"kind": "Motion", "displacement": [0, "0.1*t*t"], "region": "y < 0.25"},
                 {"kind": "Pressure", "value": "1e3*t", "region": "y > 0.5"},
                 {"kind": "Roller", "normal": [1, 1], "region": "x > 0.8 and y > 0.3"},
-                {"kind": "Traction", "value": [0, 1e3], "normal": [1, 0], "region": "0.1 < x <= 0.5"},
+                {"kind": "Traction", "value": [0, 1e3], "normal": [1, 0], "region": "0.6 < x <= 1"},
+                {"kind": "Pressure", "value": 1e2, "normal": [-1, 0], "region": "x < 0.25"},
+                {"kind": "Clamped", "point": [0, 1], "normal": [0, 1]},
             ],
         )
     )
     simulation = case.build()
-    assert [type(b).__name__ for b in simulation.boundaries] == ["Motion", "Pressure", "Roller", "Traction"]
+    kinds = ["Motion", "Pressure", "Roller", "Traction", "Pressure", "Clamped"]
+    assert [type(b).__name__ for b in simulation.boundaries] == kinds
     simulation.run(0.002)
     below = simulation.bodies[0].x[:, 1] < 0.25
     moved = (simulation.x - simulation.bodies[0].x)[below]

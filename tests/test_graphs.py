@@ -105,7 +105,8 @@ def test_graphs_with_conditions_of_the_device():
     def build():
         held = es.Velocity(lambda X: X[:, 0] < 0.2, swing)
         conditions = [held, es.Roller(lambda X: X[:, 1] < 0.1, normal=(0.0, -1.0)), es.BodyForce((0.0, -9.81))]
-        return block(2, es.Always(), boundaries=[*conditions, es.Pressure(1e4, lambda X: X[:, 0] > 0.6)])
+        conditions += [es.Pressure(1e4, lambda X: X[:, 0] > 0.6), es.Clamped((1.0, 0.0), (1.0, 0.0))]
+        return block(2, es.Always(), boundaries=conditions)
 
     both(build, steps_and_frames)
 

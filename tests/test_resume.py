@@ -46,6 +46,8 @@ def blocks(dim, reference=es.Always(), scheme=es.Verlet(), dtype=wp.float64):
         es.Fixed(lambda X: X[:, 0] < 1.0 / n, body="held"),
         es.Velocity(lambda X: X[:, 0] > 1.0 - 1.0 / n, value=lambda x, t: 5.0 * np.sin(1e3 * t), body="held"),
         es.Pressure(1e5, body="free"),
+        es.Pressure(1e5, lambda X: X[:, 0] > 4.0 - 1.0 / n, body="free"),
+        es.Clamped([3.0] * dim, -np.eye(dim)[0], body="free"),
     ]
     simulation = es.Simulation(
         bodies,

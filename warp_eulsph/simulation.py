@@ -97,12 +97,12 @@ class Simulation(Looks):
         self.ranges = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}
         self.particles = self._particles(dilation)
         self.order = Order(len(X), self.device)
-        assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order)
+        surface_given = self.bodies[0].surface is not None
+        assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order, surface_given)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
         materials = [(body.material, len(body.x)) for body in self.bodies]
         warn(self.bodies, self.particles.share.numpy() == 0.0, box, self.space.real)
         flux = Flux(self.space, materials, self.particles, self.device)
-        surface_given = self.bodies[0].surface is not None
         corrected = is_corrected(scheme, reference, surface_given)
         configuration = Configuration(
             self.space,

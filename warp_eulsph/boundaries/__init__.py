@@ -2,6 +2,7 @@
 
 from .base import Assembly, Bound, Boundary, Region
 from .body_force import BodyForce
+from .clamped import Clamped
 from .gravity import Gravity
 from .mirror import Antisymmetry, MirrorGhosts, Wall, mirror
 from .motion import Motion
@@ -16,6 +17,7 @@ __all__ = [
     "BodyForce",
     "Bound",
     "Boundary",
+    "Clamped",
     "Fixed",
     "Gravity",
     "MirrorGhosts",

@@ -28,6 +28,7 @@ class Assembly:
         particles: struct ``Particles``.
         bodies: name of a body -> its range of particle indices.
         order: gives arrays of places for indices, for particles move in memory (see ``Bound.sortable``).
+        surface_given: the bodies came with their area vectors.
     """
 
     space: Space
@@ -36,6 +37,7 @@ class Assembly:
     particles: Any
     bodies: dict[str, range]
     order: Order
+    surface_given: bool = False
 
     def select(self, region: Region | None, body: str | None, who: str) -> np.ndarray:
         """Indices of the region's particles, each once, (k,) int32: as given, ascending for masks and functions.

@@ -1,7 +1,6 @@
-"""Traction per initial area on a flat face."""
+"""Traction per initial area on a face."""
 
 import functools
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,24 +10,28 @@ import warp as wp
 
 from ..space import Space
 from .base import Assembly, Bound, Boundary, Region, unit_vector
+from .face import faces_along
 from .value import Value
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class Traction(Boundary):
-    """Nominal traction t on a flat face: force t (s_0·n) with the initial area vectors s_0, fixed in direction.
+    """Nominal traction t on a face: force t (s_0·n) with the initial area vectors s_0, fixed in direction.
 
-    The area vectors of a face spread over the particles within two support radii of it, the outermost one holding more
-    than its share (1.37 times at dilation 1.3) and those beneath it taking that back: select all of these layers. Then
-    the sum of (s_0·n) is the area of the face, and a uniform stress P = t⊗n is in equilibrium particle by particle.
+    The region names the face by its outermost particles; how deep it reaches beneath them does not matter. The force
+    goes to all particles whose area vectors make up the face, down two support radii, so that a uniform stress P = t⊗n
+    is in equilibrium particle by particle; its sum is t times the area of the face, projected along n where it is
+    curved.
 
     Args:
-        value: t [N per initial m^(dim−1)]; constant, array or function of (x, t) (see ``Value``).
+        value: t [N per initial m^(dim−1)]; constant, array or function of (x, t) (see ``Value``), taken at the
+            outermost particles.
         normal: outward unit normal n of the face, (dim,), of any length.
-        region: particles (see ``Region``); None takes all of the body, for a body with one face along n.
+        region: particles (see ``Region``) that hold the outermost ones of the face; None takes all that faces n.
         body: name of the body, any by default.
+
+    Raises:
+        ValueError: when the simulation is built: the region holds no outermost particle that faces n.
     """
 
     value: Any
@@ -47,13 +50,14 @@ def _make_load(space: Space) -> Any:
     @wp.kernel(module="unique", enable_backward=False)
     def load(
         indices: wp.array(dtype=wp.int32),
+        rows: wp.array(dtype=wp.int32),
         values: wp.array(dtype=vec),
         areas: wp.array(dtype=real),
         external: wp.array(dtype=vec),
     ):
         k = wp.tid()
         a = indices[k]
-        external[a] = external[a] + values[k] * areas[k]
+        external[a] = external[a] + values[rows[k]] * areas[k]
 
     return load
 
@@ -62,7 +66,7 @@ class BoundTraction(Bound):
     """Adds the traction force.
 
     Attributes:
-        areas: initial areas (s_0·n) [m^(dim−1)] of the particles, (k,); their sum is the area of the face.
+        face: the particles that carry it, and their areas, which sum to the area of the face; from ``start`` on.
     """
 
     reads_surface = False
@@ -70,24 +74,21 @@ class BoundTraction(Bound):
 
     def __init__(self, condition: Traction, assembly: Assembly):
         who = type(condition).__name__
+        self.condition, self.assembly = condition, assembly
         self.space, self.device = assembly.space, assembly.device
         self.normal = unit_vector(condition.normal, self.space.dim, who)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
         self.recordable = self.values.recordable
-        self.areas = wp.zeros(len(self.indices), dtype=self.space.real, device=self.device)
 
     def start(self, state: Any) -> None:
-        areas = state.surface.numpy()[self.values.places.numpy()] @ self.normal
-        self.areas.assign(areas.astype(self.space.numpy))
-        if areas.min() > -0.01 * np.abs(areas).max():
-            log.warning(
-                "Traction: the region seems to hold only the outermost layer of a face, whose areas sum to %.6g, more "
-                "than the face; select particles down to two support radii beneath it",
-                areas.sum(),
-            )
+        face = faces_along(self.assembly, state, self.indices, self.condition.body, self.normal, "Traction")
+        self.face, self._places = face, self.assembly.order.places_of(face.members)
+        rows = np.searchsorted(self.indices, face.tops[face.columns])
+        self._rows = wp.array(rows, dtype=wp.int32, device=self.device)
+        self._areas = wp.array(face.areas, dtype=self.space.real, device=self.device)
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
-        arguments = [self.values.places, values, self.areas, external]
-        wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)
+        arguments = [self._places, self._rows, values, self._areas, external]
+        wp.launch(_make_load(self.space), len(self._places), arguments, device=self.device)
