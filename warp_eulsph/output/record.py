@@ -105,6 +105,7 @@ def record(
         present = simulation.t if checkpoint is None else checkpoint.time
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
+        recording.schedule.check(present, until)
         # What is wrong with fields, probes and region is told before files move
         chosen_fields(recording.fields, simulation)
         measures = _measures(simulation, recording)
