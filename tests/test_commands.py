@@ -76,7 +76,7 @@ def test_run_resume_info_check(case, tmp_path, capsys, caplog):
     assert f"warp-eulsph resume {split} goes on" in caplog.text
     case.rename(tmp_path / "elsewhere.py")  # the run keeps a copy
     Path(split).rename(tmp_path / "moved")
-    assert main(["resume", str(tmp_path / "moved")]) == 0
+    assert main(["resume", str(tmp_path / "moved"), "--trust"]) == 0
     assert f"{case} is gone; using {tmp_path / 'moved' / 'case.py'}" in caplog.text
     one, two = Run(whole), Run(tmp_path / "moved")
     assert len(one) == len(two) == 5
@@ -110,7 +110,7 @@ def test_check_recovers_lists(case, tmp_path, capsys):
     last.write_bytes(last.read_bytes()[:500])
     assert main(["check", str(directory)]) == 2
     assert main(["check", str(directory), "--recover"]) == 0
-    assert f"{last.name}: does not open, moved to abandoned" in capsys.readouterr().out
+    assert f"{last.name}: not what was written, moved to abandoned" in capsys.readouterr().out
     assert (directory / "manifest.jsonl").read_text() == "".join(manifest.splitlines(keepends=True)[:-1])
     assert len(Run(directory)) == 4 and (directory / "run.vtkhdf").exists()
 
@@ -140,9 +140,9 @@ def test_wrong_input_is_two(case, tmp_path, capsys):
     assert f"holds a run; go on with warp-eulsph resume {tmp_path / 'run'}, choose" in capsys.readouterr().err
     assert main([*run, str(case), "--until", "1e-4", "--replace"]) == 0
     case.write_text(CASE.replace("young=17e6", "young=18e6"))
-    assert main(["resume", str(tmp_path / "run"), "--until", "2e-4"]) == 2
+    assert main(["resume", "--trust", str(tmp_path / "run"), "--until", "2e-4"]) == 2
     assert "simulation.bodies.body.material.young: 17000000.0, now 18000000.0" in capsys.readouterr().err
-    assert main(["resume", str(tmp_path / "run"), "--until", "2e-4", "--force"]) == 0
+    assert main(["resume", "--trust", str(tmp_path / "run"), "--until", "2e-4", "--force"]) == 0
 
 
 def test_unstable_run_is_three(case, tmp_path, capsys):
@@ -194,7 +194,7 @@ def test_sigterm_is_75_and_resume_leaves_no_trace(case, tmp_path):
     assert process.wait() == 75
     run = Run(tmp_path / "run")
     assert run.state == "stopped" and run.status["reason"] == "SIGTERM"
-    assert subprocess.run([*command, "resume", str(tmp_path / "run")]).returncode == 0
+    assert subprocess.run([*command, "resume", "--trust", str(tmp_path / "run")]).returncode == 0
     names = sorted(path.name for path in (tmp_path / "whole" / "snap").iterdir())
     assert names == sorted(path.name for path in (tmp_path / "run" / "snap").iterdir())
     for name in names:
@@ -290,7 +290,7 @@ def test_a_finished_run_says_that_nothing_is_left(case, tmp_path, caplog):
     caplog.set_level("INFO")
     assert main(["run", str(case), "-o", str(tmp_path / "run"), "--until", "1e-4"]) == 0
     assert "nothing left" not in caplog.text
-    assert main(["resume", str(tmp_path / "run"), "--until", "2e-4"]) == 0
+    assert main(["resume", "--trust", str(tmp_path / "run"), "--until", "2e-4"]) == 0
     assert "nothing left" not in caplog.text
-    assert main(["resume", str(tmp_path / "run")]) == 0
+    assert main(["resume", "--trust", str(tmp_path / "run")]) == 0
     assert "there was nothing left to do; --until takes the run on to a later time" in caplog.text

@@ -188,7 +188,7 @@ def test_bad_settings_are_named():
     with pytest.raises(ValueError, match="threads must be at least 1, got 0"):
         execution.set_threads(0)
     for name, value in (("WARP_EULSPH_THREADS", "many"), ("WARP_EULSPH_SIMD", "yes")):
-        command = [sys.executable, "-c", "import warp_eulsph"]
+        command = [sys.executable, "-c", "from warp_eulsph import execution; execution.simd('cpu')"]
         run = subprocess.run(command, env={**os.environ, name: value}, capture_output=True, text=True)
         assert run.returncode != 0
         assert f"{name} must be" in run.stderr

@@ -1,6 +1,5 @@
 """A run read back: lazily, by name, with derived fields; and by VTK, bit for bit, wherever the folder is."""
 
-import json
 import sys
 import time
 
@@ -12,7 +11,7 @@ from kept_runs import UNTIL, plate, recording, run
 from test_snapshots import pad
 
 import warp_eulsph as es
-from warp_eulsph.output import Recording, Run, SnapshotWriter, read_snapshot, record
+from warp_eulsph.output import Recording, Run, RunDirectory, SnapshotWriter, read_snapshot, record
 from warp_eulsph.output.manifest import Manifest, entry_of
 from warp_eulsph.schedule import EveryTime
 
@@ -189,8 +188,8 @@ def test_a_running_run_can_be_read_and_a_killed_one_is_told(tmp_path):
 
     run(tmp_path, until=1e-3, watch=watch)
     assert {state for state, _ in states} == {"running"} and states[-1][1] >= 1
-    status = json.loads((tmp_path / "status.json").read_text()) | {"state": "running"}
-    (tmp_path / "status.json").write_text(json.dumps(status))
+    home = RunDirectory(tmp_path)
+    home.write(home.status, home.read(home.status) | {"state": "running"})
     assert Run(tmp_path).state == "killed"
 
 

@@ -23,6 +23,7 @@ from warp_eulsph.output import (
     read_snapshot,
     record,
 )
+from warp_eulsph.output.atomic import temporary_beside
 from warp_eulsph.schedule import AtTimes, EverySteps, EveryTime
 
 
@@ -194,7 +195,7 @@ def test_torn_lists_are_mended_at_the_resume(whole, tmp_path):
     for name in ("manifest.jsonl", "log.jsonl"):
         with (tmp_path / name).open("a") as file:
             file.write('{"name": "snap/00')
-    (tmp_path / "snap" / "0000000011.vtkhdf.tmp").write_bytes(b"part of a frame")
+    temporary_beside(tmp_path / "snap" / "0000000011.vtkhdf").write_bytes(b"part of a frame")
     run(tmp_path, resume=True)
     assert contents(tmp_path) == contents(whole[0])
     assert not list(tmp_path.rglob("*.tmp"))

@@ -12,7 +12,7 @@ from kept_runs import StopAfter, contents
 from warp_eulsph.cases import CaseError, parse_case, read_case
 from warp_eulsph.cli import main
 from warp_eulsph.operators.values import Linear
-from warp_eulsph.output import BodyProbe, Recording, Run, record
+from warp_eulsph.output import BodyProbe, Recording, Run, RunDirectory, record
 from warp_eulsph.schedule import EverySteps, EveryTime
 from warp_eulsph.scheme.health import UnstableError
 from warp_eulsph.scheme.scalar import ConservationLaw, LinearAdvection, OneStepLax, TwoStepLaxWendroff
@@ -138,9 +138,10 @@ def test_changed_cases_are_not_resumed(tmp_path, capsys):
     arguments = ["run", str(CASES / "cosine_profile.toml"), "-o", str(tmp_path), "--max-wall", "0"]
     assert main(arguments) == 75
     (tmp_path / "case.toml").write_text((CASES / "cosine_profile.toml").read_text().replace("[1] ", "[2] "))
-    described = json.loads((tmp_path / "run.json").read_text())
+    home = RunDirectory(tmp_path)
+    described = home.read(home.description)
     described["case"]["source"] = str(tmp_path / "case.toml")
-    (tmp_path / "run.json").write_text(json.dumps(described))
+    home.write(home.description, described)
     assert main(["resume", str(tmp_path)]) == 2
     assert "simulation.flux.velocity: [1.0], now [2.0]" in capsys.readouterr().err
 

@@ -59,6 +59,7 @@ from .scheme.verlet import Verlet
 from .simulation import Body, Simulation
 from .space import Space
 from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, WendlandC2, WendlandC4, WendlandC6
+from .whole import BrokenError
 
 __all__ = [
     "Always",
@@ -69,6 +70,7 @@ __all__ = [
     "Body",
     "BodyForce",
     "Boundary",
+    "BrokenError",
     "Clamped",
     "Convected",
     "CubicSpline",

@@ -7,7 +7,7 @@ import numpy as np
 
 from .checks import real_array, spread
 from .materials import Material
-from .summary import Rows, as_html, as_text, extent, mass_unit, spread
+from .summary import Rows, as_html, as_text, extent, least_to_largest, mass_unit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,9 +73,9 @@ class Body:
         return f"Body {self.name!r}: {n} particles, {dim}-D", [
             ("material", repr(self.material)),
             ("extent", extent(self.x)),
-            ("spacing", spread(self.spacing, "m")),
+            ("spacing", least_to_largest(self.spacing, "m")),
             ("mass", f"{mass:.6g} {mass_unit(dim)}"),
-            ("speed", spread(np.linalg.norm(self.velocity, axis=1), "m/s")),
+            ("speed", least_to_largest(np.linalg.norm(self.velocity, axis=1), "m/s")),
             ("surface", "of the arrangement" if self.surface is None else "given"),
         ]
 

@@ -31,8 +31,8 @@ def _cores() -> int:
 
 def _from_environment() -> tuple[int, bool, bool | None]:
     given = os.environ.get("WARP_EULSPH_THREADS", "")
-    if given and not (given.isdigit() and int(given) > 0):
-        raise ValueError(f"WARP_EULSPH_THREADS must be a number of threads, at least 1, got {given!r}")
+    if given and not (given.isascii() and given.isdecimal() and len(given) < 5 and int(given) > 0):
+        raise ValueError(f"WARP_EULSPH_THREADS must be a number of threads, from 1 to 9999, got {given!r}")
     vectors = os.environ.get("WARP_EULSPH_SIMD", "1")
     if vectors not in ("0", "1"):
         raise ValueError(f"WARP_EULSPH_SIMD must be 0 or 1, got {vectors!r}")
@@ -42,7 +42,11 @@ def _from_environment() -> tuple[int, bool, bool | None]:
     return int(given) if given else _cores(), vectors == "1", {"auto": None, "0": False, "1": True}[recorded]
 
 
-_threads, _simd, _graphs = _from_environment()
+_wrong: str | None = None
+try:
+    _threads, _simd, _graphs = _from_environment()
+except ValueError as error:  # told when something is to be run, not by a package that cannot be imported
+    _threads, _simd, _graphs, _wrong = 1, True, None, str(error)
 _pool: ThreadPoolExecutor | None = None
 
 
@@ -68,7 +72,13 @@ def set_simd(on: bool) -> None:
 
 
 def simd(device: Any) -> bool:
-    """Whether SIMD kernels are to be used on this device."""
+    """Whether SIMD kernels are to be used on this device.
+
+    Raises:
+        ValueError: the environment sets something that is none of its values.
+    """
+    if _wrong is not None:
+        raise ValueError(_wrong)
     return _simd and wp.get_device(device).is_cpu
 
 

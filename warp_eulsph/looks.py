@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .space import Space
 
 #: Forces of ``fields.FORCES`` that move a particle, those of the conditions among them.
-ALL_FORCES = ("internal", "correction", "dissipation", "external", "reaction")
+ALL_FORCES = ("internal", "correction", "tie", "dissipation", "external", "reaction")
 
 
 class Looks:

@@ -15,7 +15,7 @@ from .space import Space
 log = logging.getLogger(__name__)
 
 
-def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) -> float:
+def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n: float = math.inf) -> float:
     """About what the default scheme allocates per particle, inside a body.
 
     Args:
@@ -24,6 +24,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) ->
         moving: whether the arrangement moves: lists with room to grow, what a search needs, balanced positions. Where
             it does not, positions are tied to F.
         device: SIMD kernels of the CPU keep packed rows.
+        n: particles there are, more than which are nobody's neighbours.
     """
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
@@ -45,15 +46,23 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any) ->
         reals += 5
         ints += 6
     item = wp.types.type_size_in_bytes(space.real)
-    neighbours = math.pi ** (d / 2) / math.gamma(d / 2 + 1) * reach**d
+    neighbours = min(math.pi ** (d / 2) / math.gamma(d / 2 + 1) * min(reach, 1e99) ** d, n)
     return reals * item + 4 * ints + 8 * doubles + neighbours * (4 + item) * (1.25 if moving else 1.0)
 
 
 def available(device: Any) -> int | None:
-    """Bytes that can be allocated on the device, None where the system does not say."""
+    """Bytes that can be allocated on the device, None where the system does not say.
+
+    On the CPU what the machine has left, or the memory group of this process (as of a container or a batch job).
+    """
     device = wp.get_device(device)
     if device.is_cuda:
         return int(device.free_memory)
+    left = [bytes_left for bytes_left in (_of_machine(), *of_groups()) if bytes_left is not None]
+    return min(left, default=None)
+
+
+def _of_machine() -> int | None:
     table = Path("/proc/meminfo")
     if not table.exists():
         return None
@@ -61,9 +70,46 @@ def available(device: Any) -> int | None:
     return int(lines["MemAvailable"].split()[0]) * 1024
 
 
+def of_groups(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")) -> list[int]:
+    """Bytes left in each memory group that this process is in, those above it too; of version 1 or 2."""
+    if not own.exists():
+        return []
+    found = []
+    for line in own.read_text(encoding="utf-8", errors="replace").splitlines():
+        _, controllers, path = line.split(":", 2)
+        if controllers == "" or "memory" in controllers.split(","):
+            top = root if controllers == "" else root / "memory"
+            folder = top / path.lstrip("/")
+            found += [_left(group) for group in (folder, *folder.parents) if group == top or top in group.parents]
+    return [left for left in found if left is not None]
+
+
+def _left(group: Path) -> int | None:
+    for limit, usage in (("memory.max", "memory.current"), ("memory.limit_in_bytes", "memory.usage_in_bytes")):
+        try:
+            most, used = ((group / name).read_text(encoding="ascii").strip() for name in (limit, usage))
+            if most == "max":
+                return None
+            stat = dict(line.split() for line in (group / "memory.stat").read_text(encoding="ascii").splitlines())
+            return max(int(most) - int(used) + int(stat.get("inactive_file", 0)), 0)  # files' pages make room
+        except (OSError, ValueError):
+            continue
+    return None
+
+
+def check_room(count: float, reals: float, who: str) -> None:
+    """Raise MemoryError unless there is room for ``count`` rows of so many doubles, before they are made."""
+    there = available("cpu")
+    if there is not None and 8.0 * count * reals > there:
+        raise MemoryError(
+            f"{who}: {count:.4g} particles need {8e-9 * count * reals:.3g} GB to be laid out, and {there / 1e9:.3g} GB "
+            "are available; increase the spacing"
+        )
+
+
 def check_memory(space: Space, n: int, reach: float, moving: bool, device: Any) -> None:
     """Log what ``n`` particles will take; raise MemoryError if that is more than there is."""
-    each, there = bytes_per_particle(space, reach, moving, device), available(device)
+    each, there = bytes_per_particle(space, reach, moving, device, n), available(device)
     log.info("%d particles take about %.0f bytes each, %.3g MB", n, each, n * each / 1e6)
     if there is not None and n * each > there:
         raise MemoryError(

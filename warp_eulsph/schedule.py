@@ -4,9 +4,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from numbers import Integral, Real
 
 # Times closer than this share of an interval, or of themselves, are one: a step between them would be round-off.
 SAME = 1e-9
+# Times of one schedule in a run; a step a microsecond for a quarter of an hour. More were meant otherwise.
+MOST_TIMES = 1e9
 
 
 class Schedule(ABC):
@@ -24,6 +27,9 @@ class Schedule(ABC):
         """Steps from ``step`` to the next one that is due; None if steps do not count."""
         return None
 
+    def check(self, t: float, until: float) -> None:  # noqa: B027 - most have nothing to refuse
+        """ValueError if a run from ``t`` to ``until`` [s] would not end in anybody's time."""
+
 
 @dataclass(frozen=True)
 class EveryTime(Schedule):
@@ -38,19 +44,32 @@ class EveryTime(Schedule):
     start: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("interval", "start"):
+            given = getattr(self, name)
+            if isinstance(given, bool) or not isinstance(given, Real):
+                raise ValueError(f"{name} must be a time [s], got {given!r}")
         if not (math.isfinite(self.interval) and self.interval > 0.0):
             raise ValueError(f"interval must be a positive time [s], got {self.interval}")
         if not math.isfinite(self.start):
             raise ValueError(f"start must be a finite time [s], got {self.start}")
 
     def due(self, t: float, step: int) -> bool:
-        return abs(t - self._time(round((t - self.start) / self.interval))) <= SAME * self.interval
+        k = (t - self.start) / self.interval
+        return math.isfinite(k) and abs(t - self._time(round(k))) <= SAME * self.interval
 
     def next_time(self, t: float) -> float:
-        k = max(math.floor((t - self.start) / self.interval), 0)
-        while self._time(k) <= t + SAME * self.interval:
-            k += 1
-        return self._time(k)
+        k = (t - self.start) / self.interval
+        first = max(math.floor(k), 0) if math.isfinite(k) else 0
+        for ahead in range(first, first + 4):
+            if self._time(ahead) > t + SAME * self.interval and self._time(ahead) > t:
+                return self._time(ahead)
+        raise ValueError(f"interval must be long enough to be told apart at t = {t} s, got {self.interval} s")
+
+    def check(self, t: float, until: float) -> None:
+        if (until - t) / self.interval > MOST_TIMES:
+            raise ValueError(
+                f"interval must be at least 1/{MOST_TIMES:.0e} of the time from {t} to {until} s, got {self.interval} s"
+            )
 
     def _time(self, k: int) -> float:
         return self.start + self.interval * k
@@ -63,8 +82,8 @@ class EverySteps(Schedule):
     count: int
 
     def __post_init__(self) -> None:
-        if self.count < 1:
-            raise ValueError(f"count of steps must be at least 1, got {self.count}")
+        if isinstance(self.count, bool) or not isinstance(self.count, Integral) or self.count < 1:
+            raise ValueError(f"count of steps must be at least 1, got {self.count!r}; a whole number")
 
     def due(self, t: float, step: int) -> bool:
         return step % self.count == 0
@@ -112,6 +131,10 @@ class AnyOf(Schedule):
         left = [steps for schedule in self.schedules if (steps := schedule.steps_left(step)) is not None]
         return min(left, default=None)
 
+    def check(self, t: float, until: float) -> None:
+        for schedule in self.schedules:
+            schedule.check(t, until)
+
 
 def next_target(schedule: Schedule, t: float, until: float) -> float:
     """The next time [s] to hit exactly, at most ``until``, which swallows a target a hair before it."""
@@ -121,6 +144,7 @@ def next_target(schedule: Schedule, t: float, until: float) -> float:
 
 def targets(schedule: Schedule, t: float, until: float) -> Iterator[float]:
     """The times [s] after ``t`` that ``schedule`` has up to ``until``, which is the last."""
+    schedule.check(t, until)
     while t < until:
         t = next_target(schedule, t, until)
         yield t

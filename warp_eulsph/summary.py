@@ -27,7 +27,7 @@ def extent(x: np.ndarray) -> str:
     return " × ".join(f"{low:.4g} … {high:.4g}" for low, high in sides) + " m"
 
 
-def spread(values: Any, unit: str) -> str:
+def least_to_largest(values: Any, unit: str) -> str:
     """A number, or least and largest where they differ by more than round-off."""
     low, high = float(np.min(values)), float(np.max(values))
     if high - low <= 1e-9 * max(abs(low), abs(high)):

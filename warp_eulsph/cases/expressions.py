@@ -8,6 +8,7 @@ import ast
 import difflib
 import functools
 import linecache
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -55,7 +56,7 @@ FUNCTIONS = {
     "atan": _plain("atan", np.arctan),
     "atan2": _plain("atan2", np.arctan2, 2),
     "clip": _plain("clamp", np.clip, 3),
-    "hypot": Function(2, 2, np.hypot, lambda a, b: f"wp.sqrt(({a}) * ({a}) + ({b}) * ({b}))"),
+    "hypot": Function(2, 2, np.hypot, lambda a, b: f"hypot({a}, {b})"),
     "min": _pairwise("min", np.minimum),
     "max": _pairwise("max", np.maximum),
     # 0 below 0, 1 above 1, smooth between: s² (3 − 2 s)
@@ -116,6 +117,9 @@ def parse(
     Raises:
         ValueError: not a formula, an unknown name or function, or a number where a truth is asked for.
     """
+    if unicodedata.normalize("NFKC", text) != text:
+        plain = unicodedata.normalize("NFKC", text)
+        raise ValueError(f"must be in plain letters, got {text!r}; write {plain!r} if that is meant")
     if len(text) > LONGEST:
         raise ValueError(f"a formula must have at most {LONGEST} characters, got {len(text)}")
     try:
@@ -223,8 +227,11 @@ def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> Any:
     raise AssertionError(ast.dump(node))
 
 
-def _source(node: ast.AST, values: Mapping[str, Any]) -> str:
-    """Warp's source of a node; ``values`` are numbers, and the local variables of definitions, by name."""
+def _source(node: ast.AST, values: Mapping[str, Any], lines: list[str]) -> str:
+    """Warp's source of a node; ``values`` are numbers, and the local variables of definitions, by name.
+
+    What it needs twice it adds to ``lines`` that come first: source in proportion to the formula, however it is nested.
+    """
     match node:
         case ast.Constant(value=value):
             return f"real({float(value)!r})"  # type: ignore[arg-type]
@@ -235,21 +242,30 @@ def _source(node: ast.AST, values: Mapping[str, Any]) -> str:
             return value if isinstance(value, str) else f"real({float(value)!r})"
         case ast.UnaryOp(op=op, operand=operand):
             sign = "not " if isinstance(op, ast.Not) else "-" if isinstance(op, ast.USub) else "+"
-            return f"({sign}{_source(operand, values)})"
+            return f"({sign}{_source(operand, values, lines)})"
         case ast.BinOp(left=left, op=op, right=right):
-            a, b = _source(left, values), _source(right, values)
+            a, b = _source(left, values, lines), _source(right, values, lines)
             return f"wp.pow({a}, {b})" if isinstance(op, ast.Pow) else f"({a} {OPERATORS[type(op)][0]} {b})"
         case ast.Compare(left=left, ops=ops, comparators=right):
-            sides = [_source(child, values) for child in (left, *right)]
+            sides = [_source(child, values, lines) for child in (left, *right)]
+            for k in range(1, len(sides) - 1):  # those in the middle of a chain are compared on both sides
+                sides[k] = _named(sides[k], lines)
             pairs = zip(ops, sides, sides[1:], strict=False)
             return "(" + " and ".join(f"({a} {OPERATORS[type(op)][0]} {b})" for op, a, b in pairs) + ")"
         case ast.BoolOp(op=op, values=children):
-            return "(" + f" {OPERATORS[type(op)][0]} ".join(_source(child, values) for child in children) + ")"
+            return "(" + f" {OPERATORS[type(op)][0]} ".join(_source(child, values, lines) for child in children) + ")"
         case ast.IfExp(test=test, body=body, orelse=orelse):
-            return f"wp.where({', '.join(_source(child, values) for child in (test, body, orelse))})"
+            return f"wp.where({', '.join(_source(child, values, lines) for child in (test, body, orelse))})"
         case ast.Call(func=ast.Name(id=name), args=arguments):
-            return FUNCTIONS[name].device(*(_source(child, values) for child in arguments))
+            return FUNCTIONS[name].device(*(_source(child, values, lines) for child in arguments))
     raise AssertionError(ast.dump(node))
+
+
+def _named(source: str, lines: list[str]) -> str:
+    """A local variable that holds what ``source`` gives."""
+    name = f"d{len(lines)}"
+    lines.append(f"{name} = {source}")
+    return name
 
 
 def device_function(expressions: Sequence[Expression], values: Mapping[str, float], space: Space) -> Any:
@@ -259,9 +275,9 @@ def device_function(expressions: Sequence[Expression], values: Mapping[str, floa
     for expression in expressions:
         for name, definition in expression.definitions:
             if name not in known:
-                known[name] = f"d{len(lines)}"
-                lines.append(f"{known[name]} = {_source(definition.tree, known)}")
-    return _compiled(tuple(lines), tuple(_source(expression.tree, known) for expression in expressions), space)
+                known[name] = _named(_source(definition.tree, known, lines), lines)
+    parts = [_source(expression.tree, known, lines) for expression in expressions]
+    return _compiled(tuple(lines), tuple(parts), space)
 
 
 @functools.cache
@@ -281,12 +297,16 @@ def _compiled(lines: tuple[str, ...], parts: tuple[str, ...], space: Space) -> A
     def sign(s: real) -> real:
         return wp.where(s == real(0.0), real(0.0), wp.sign(s))
 
+    @wp.func
+    def hypot(a: real, b: real) -> real:
+        return wp.sqrt(a * a + b * b)
+
     body = "".join(f"    {line}\n" for line in (*lines, f"return row({', '.join(parts)})"))
     source = f"def formula(x: vec, t: real):\n{body}"
     # Warp reads the source of a function by its file: this one is only in the cache of files.
     file = f"<formula {source!r} {space!r}>"
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    scope: dict[str, Any] = {"wp": wp, "smoothstep": smoothstep, "sign": sign}
+    scope: dict[str, Any] = {"wp": wp, "smoothstep": smoothstep, "sign": sign, "hypot": hypot}
     scope |= {"real": real, "vec": space.vec, "row": space.row(len(parts))}
     exec(compile(source, file, "exec"), scope)
     return wp.func(scope["formula"])

@@ -3,6 +3,7 @@
 import copy
 import keyword
 import sys
+import unicodedata
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -137,7 +138,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], list[str]]:
     for name, value in given.items() if isinstance(given, dict) else ():
         path = f"parameters.{name}"
         if not _can_be_named(name):
-            problems.append(f"{path}: {_NAMES}")
+            problems.append(f"{path}: {_misnamed(name)}")
         elif isinstance(value, str):
             try:
                 parameters[name] = number(value, parameters)
@@ -160,7 +161,7 @@ def _definitions(given: Any, parameters: dict[str, float]) -> tuple[dict[str, Ex
         path = f"definitions.{name}"
         try:
             if not _can_be_named(name):
-                raise ValueError(_NAMES)
+                raise ValueError(_misnamed(name))
             if name in parameters:
                 raise ValueError("is the name of a parameter, too")
             if not isinstance(value, str):
@@ -175,8 +176,18 @@ def _definitions(given: Any, parameters: dict[str, float]) -> tuple[dict[str, Ex
 _NAMES = "must be named by letters, digits and _, and not like a coordinate or function"
 
 
+def _misnamed(name: str) -> str:
+    plain = unicodedata.normalize("NFKC", name)
+    return _NAMES if plain == name else f"{_NAMES}; its letters mean {plain!r}, write that"
+
+
 def _can_be_named(name: str) -> bool:
-    return name.isidentifier() and not keyword.iskeyword(name) and name not in (*COORDINATES, "t", "pi", *FUNCTIONS)
+    return (
+        unicodedata.normalize("NFKC", name) == name  # as formulas are read: other letters would mean these
+        and name.isidentifier()
+        and not keyword.iskeyword(name)
+        and name not in (*COORDINATES, "t", "pi", *FUNCTIONS)
+    )
 
 
 def _explained(error: ValidationError, data: Any, context: Reading) -> list[str]:

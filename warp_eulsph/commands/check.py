@@ -28,8 +28,8 @@ def run(arguments: argparse.Namespace) -> int:
         if not RunDirectory(arguments.directory).holds_a_run:
             raise FileNotFoundError(f"no run in {arguments.directory}")
         if arguments.recover:
-            for name in recover(arguments.directory):
-                print(f"{name}: does not open, moved to abandoned")
+            for line in recover(arguments.directory):
+                print(line)
         found = check(arguments.directory)
     except (BusyError, ValueError, OSError) as error:
         print(f"warp-eulsph: {error}", file=sys.stderr)

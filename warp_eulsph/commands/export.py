@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
         frames = [found[k] for k in chosen(len(found), arguments.frames)]
         fields = None if arguments.fields is None else [name.strip() for name in arguments.fields.split(",")]
         path = export(frames, arguments.output, fields)
-    except (ValueError, OSError, ModuleNotFoundError) as error:
+    except (ValueError, OSError, KeyError, ModuleNotFoundError) as error:
         return complain(error)
     print(path)
     return 0

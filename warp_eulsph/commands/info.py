@@ -59,31 +59,56 @@ def _said(simulation: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def lines(found: Any) -> list[tuple[str, str]]:
-    """What is said of a run: (name, text)."""
+    """What is said of a run: (name, text); of what is damaged, that it is."""
+    shown = [("directory", str(found.directory.path))]
+    for name, part in (
+        ("run.json", _described),
+        ("status.json", _state),
+        ("snapshots", _snapshots),
+        ("log.jsonl", _logged),
+        ("probes", _kept),
+    ):
+        try:
+            shown += part(found)
+        except (ValueError, OSError, KeyError, TypeError, AttributeError) as error:
+            shown.append((name, f"cannot be read, {error}; warp-eulsph check tells more"))
+    return shown
+
+
+def _described(found: Any) -> list[tuple[str, str]]:
+    simulation, case = found.description.get("simulation", {}), found.description.get("case", {})
+    source = case.get("source")
+    shown = [] if source is None else [("case", " ".join([source, *case["overrides"]]))]
+    return shown + (_said(simulation) if simulation else [])
+
+
+def _state(found: Any) -> list[tuple[str, str]]:
+    status = found.status
+    if not status:
+        return []
+    reason = f": {status['reason']}" if status["reason"] else ""
+    return [("state", f"{found.state}{reason}"), ("end", f"t = {status['until']:.8g} s")]
+
+
+def _snapshots(found: Any) -> list[tuple[str, str]]:
+    if not len(found):
+        return []
+    first, last = found[0], found[-1]
+    counted = f"{len(found)} of {last.N} particles, t = {first.time:.8g} to {last.time:.8g} s"
+    return [("snapshots", counted), ("fields", ", ".join(found.fields))]
+
+
+def _logged(found: Any) -> list[tuple[str, str]]:
+    log = found.log
+    if not log:
+        return []
+    figures = [f"{name} {log[key][-1]:.6g}{unit}" for key, name, unit in LOGGED if key in log]
+    return [("log", f"step {log['step'][-1]}, t = {log['t'][-1]:.8g} s, {', '.join(figures)}")]
+
+
+def _kept(found: Any) -> list[tuple[str, str]]:
     from ..output.checkpoint import Checkpoints
 
-    simulation, status = found.description.get("simulation", {}), found.status
-    shown = [("directory", str(found.directory.path))]
-    source = found.description.get("case", {}).get("source")
-    if source is not None:
-        shown.append(("case", " ".join([source, *found.description["case"]["overrides"]])))
-    if simulation:
-        shown += _said(simulation)
-    if status:
-        reason = f": {status['reason']}" if status["reason"] else ""
-        shown.append(("state", f"{found.state}{reason}"))
-        shown.append(("end", f"t = {status['until']:.8g} s"))
-    if len(found):
-        first, last = found[0], found[-1]
-        shown.append(("snapshots", f"{len(found)} of {last.N} particles, t = {first.time:.8g} to {last.time:.8g} s"))
-        shown.append(("fields", ", ".join(found.fields)))
-    log = found.log
-    if log:
-        figures = [f"{name} {log[key][-1]:.6g}{unit}" for key, name, unit in LOGGED if key in log]
-        shown.append(("log", f"step {log['step'][-1]}, t = {log['t'][-1]:.8g} s, {', '.join(figures)}"))
-    if found.probe_names:
-        shown.append(("probes", ", ".join(found.probe_names)))
+    shown = [("probes", ", ".join(found.probe_names))] if found.probe_names else []
     names = [path.stem.lstrip("0") or "0" for path in Checkpoints(found.directory.checkpoints).paths()]
-    if names:
-        shown.append(("checkpoints", f"steps {', '.join(names)}"))
-    return shown
+    return [*shown, ("checkpoints", f"steps {', '.join(names)}")] if names else shown

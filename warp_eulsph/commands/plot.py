@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
             path = picture(found[frames[0]], arguments.output, options)
         else:
             path = film(found, arguments.output, options, frames=frames, fps=arguments.fps)
-    except (ValueError, OSError, ModuleNotFoundError) as error:
+    except (ValueError, OSError, KeyError, ModuleNotFoundError) as error:
         return complain(error)
     print(path)
     return 0

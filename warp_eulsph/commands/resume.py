@@ -3,9 +3,12 @@
 import argparse
 import logging
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .options import STATUS, add_options
+
+if TYPE_CHECKING:
+    from ..output import RunDirectory
 
 log = logging.getLogger(__name__)
 
@@ -20,6 +23,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("directory", metavar="DIR", type=Path, help="directory of the run")
     parser.add_argument("--force", action="store_true", help="go on although the case has changed")
+    parser.add_argument("--trust", action="store_true", help="run the program (case.py) that the directory names")
     add_options(parser)
     parser.set_defaults(run_command=run)
 
@@ -36,27 +40,43 @@ def run(arguments: argparse.Namespace) -> int:
         kept = home.read(home.description)
         if not kept:
             raise ValueError(f"no run in {home.path}: run.json is not there")
-        origin = kept["case"]
+        origin = kept.get("case")
         if not origin:
             raise ValueError(
                 f"the run in {home.path} was made by a program, not by this command; resume it there with "
                 "record(simulation, directory, until, recording, resume=True)"
             )
-        device = origin["device"] if arguments.device is None else arguments.device
-        case = load_case(*_source(home.path, origin), device)
+        source, overrides, named = _source(home, origin)
+        if source.endswith(".py") and not arguments.trust:
+            raise ValueError(
+                f"to resume {home.path} means to run the program {source}, which its run.json names; look at it, and "
+                "say --trust if it is yours"
+            )
+        device = named if arguments.device is None else arguments.device
+        case = load_case(source, overrides, device)
+        until = kept.get("until") if arguments.until is None else arguments.until
+        if isinstance(until, bool) or not isinstance(until, int | float):
+            raise ValueError(f"run.json must have the end time as a number, got {until!r}; give it as --until")
     except (ValueError, OSError) as error:
         return complain(error, BAD_INPUT)
-    until = kept["until"] if arguments.until is None else arguments.until
     return carry_out(case, home.path, until, arguments.max_wall, resume=True, force=arguments.force, replace=False)
 
 
-def _source(directory: Path, origin: dict[str, Any]) -> tuple[str, list[str]]:
-    """The case and its settings: where they came from, or what the run kept of them when that is gone."""
+def _source(home: "RunDirectory", origin: Any) -> tuple[str, list[str], str | None]:
+    """The case, its settings and its device: the case from where it came, or the copy that the run kept of it.
+
+    Raises:
+        ValueError: run.json does not say.
+    """
     from .loading import EXAMPLE
 
-    source = origin["source"]
-    if source.startswith(EXAMPLE) or Path(source).exists():
-        return source, origin["overrides"]
-    copy = directory / f"case{Path(source).suffix}"
+    source = origin.get("source") if isinstance(origin, dict) else None
+    overrides, device = (origin.get("overrides", []), origin.get("device")) if source else ([], None)
+    of_text = isinstance(overrides, list) and all(isinstance(override, str) for override in overrides)
+    if not isinstance(source, str) or not of_text or not isinstance(device, str | None):
+        raise ValueError(f"{home.description} must say where the case came from, got {origin!r}")
+    if source.startswith(EXAMPLE) or Path(source).is_file():
+        return source, overrides, device
+    copy = home.path / f"case{Path(source).suffix}"
     log.warning("%s is gone; using %s", source, copy)
-    return str(copy), [] if copy.suffix == ".toml" else origin["overrides"]  # which has them in it
+    return str(copy), [] if copy.suffix == ".toml" else overrides, device  # which has them in it

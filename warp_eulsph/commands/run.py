@@ -31,6 +31,10 @@ def run(arguments: argparse.Namespace) -> int:
     except (ValueError, OSError) as error:
         return complain(error, BAD_INPUT)
     directory = arguments.output or Path("runs") / case.name
+    try:
+        RunDirectory(directory).check_own()
+    except OSError as error:
+        return complain(error, BAD_INPUT)
     if RunDirectory(directory).holds_a_run and not arguments.replace:  # before anything is built
         options = "choose another directory with -o, or begin anew with --replace"
         return complain(f"{directory} holds a run; go on with warp-eulsph resume {directory}, {options}", BAD_INPUT)

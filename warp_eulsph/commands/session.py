@@ -30,7 +30,7 @@ def carry_out(
         recording: Recording = case.recording(simulation)
         log.info("%s: %d particles on %s", case.name, len(simulation.particles.mass), simulation.device)
         home = RunDirectory(directory)
-        before = home.read(home.status).get("step") if resume else None
+        before = _steps_before(home) if resume else None
         stop = Stop(wall=wall, file=home.stop)
         with stop, Progress(until) as progress, logging_redirect_tqdm():
             outcome = record(
@@ -48,8 +48,8 @@ def carry_out(
             )
     except UnstableError as error:
         return complain(error, UNSTABLE)
-    except (FileExistsError, FileNotFoundError, ModuleNotFoundError, ValueError, BusyError) as error:
-        return complain(error, BAD_INPUT)
+    except (FileExistsError, FileNotFoundError, ModuleNotFoundError, ValueError, BusyError, MemoryError) as error:
+        return complain(error or "out of memory; use fewer particles", BAD_INPUT)
     except OSError as error:
         return complain(f"{error}; what was written before is whole, warp-eulsph resume {directory} goes on", FAILED)
     if outcome.stopped is not None:
@@ -61,11 +61,20 @@ def carry_out(
             directory,
         )
         return STOPPED
-    home.stop.unlink(missing_ok=True)  # asked for too late
+    if home.stop.is_file():
+        home.stop.unlink(missing_ok=True)  # asked for too late
     log.info("done: step %d, t = %.8g s, in %s", outcome.step, outcome.time, directory)
     if outcome.step == before:
         log.info("there was nothing left to do; --until takes the run on to a later time")
     return DONE
+
+
+def _steps_before(home: RunDirectory) -> int | None:
+    """Steps that the run took before; None where status.json is damaged, which matters to nothing else."""
+    try:
+        return home.read(home.status).get("step")
+    except (OSError, ValueError):
+        return None
 
 
 def complain(error: object, status: int) -> int:

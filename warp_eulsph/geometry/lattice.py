@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..memory import check_room
 from .filling import Filling, Lattice
 
 # Particles are numbered by 32-bit integers.
@@ -37,6 +38,7 @@ def box(
     Raises:
         ValueError: corners of unequal or wrong length, a spacing that leaves an axis without a cell or asks for more
             particles than can be numbered, or a jitter out of range.
+        MemoryError: more particles than there is memory for.
     """
     if not 0.0 <= jitter < 0.5:
         raise ValueError(f"jitter must be in [0, 0.5) spacings, got {jitter}; 0.1 is irregular already")
@@ -101,6 +103,7 @@ def _cells(
             f"a body must have at most {MOST_PARTICLES} particles, got {cells.prod() * each:.3g} at spacing "
             f"{spacing:.6g} m; increase it"
         )
+    check_room(float((cells + 1).prod() * each), 5.0 * low.size, "a box")  # ranks, centres, places, and what is kept
     return low, length / cells, cells.astype(int)
 
 

@@ -9,7 +9,7 @@ from .filling import Filling, Lattice
 from .outline import read_outline
 from .relaxation import Relaxation
 from .solid import Solid
-from .surface import Surface, read_surface
+from .surface import read_surface
 
 
 def mesh(
@@ -25,7 +25,7 @@ def mesh(
     Inside is where the winding number says so, so that concave and nested surfaces are right.
 
     Args:
-        file: any mesh that meshio reads: STL, OBJ, PLY, VTK, VTU, gmsh; a surface, or tetrahedra.
+        file: any mesh that meshio or trimesh reads: STL, OBJ, PLY, VTK, VTU, gmsh; a surface, or solid elements.
         spacing: wanted spacing [m], the cube root of a particle's volume.
         scale: length of the file's unit [m], 1e-3 for millimetres.
         filling: Lattice(), BodyCentred() or Staggered(), cut to the shape.
@@ -37,15 +37,17 @@ def mesh(
     Raises:
         ModuleNotFoundError: meshio is not installed.
         OSError: no such file.
-        ValueError: not a mesh, an open surface, one that encloses nothing, or a spacing too coarse.
+        ValueError: not a mesh, an open surface, parts that lie in each other, nothing inside, or a spacing too coarse.
     """
     surface = read_surface(file, scale)
     who = f"mesh {file}"
     surface.check_closed(who)
+    surface.check_apart(who)
     volume = surface.volume
     if volume < 0.0:  # all triangles face inwards
-        surface, volume = Surface(surface.points, surface.triangles[:, ::-1], surface.patches), -volume
-    lower, upper = surface.points.min(axis=0), surface.points.max(axis=0)
+        surface, volume = surface.turned(), -volume
+    corners = surface.points[surface.triangles].reshape(-1, 3)
+    lower, upper = corners.min(axis=0), corners.max(axis=0)
     if not volume > 1e-9 * np.prod(upper - lower):
         raise ValueError(f"{who}: the surface must enclose a volume, got {volume:.6g} m^3")
     solid = Solid(lower, upper, volume, surface.query(winding=True), surface.query(winding=False))

@@ -1,8 +1,13 @@
 """Mesh files read by meshio: corners in metres, cells, and the groups that they belong to."""
 
+import contextlib
+import io
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,17 +23,17 @@ class MeshFile:
         points: corners [m], (k, 3).
         cells: kind (``triangle``, ``line`` …) -> numbers of their corners, (m, …).
         groups: kind -> number of the group of each cell, (m,), −1 without one.
-        names: number of a group -> its name.
+        names: dimension and number of a group -> its name; files number groups of each dimension by themselves.
     """
 
     points: np.ndarray
     cells: dict[str, np.ndarray]
     groups: dict[str, np.ndarray]
-    names: dict[int, str]
+    names: dict[tuple[int, int], str]
 
-    def patch(self, group: int) -> str:
-        """Name of a group, its number where it has none."""
-        return self.names.get(int(group), str(int(group)))
+    def patch(self, group: int, dimension: int) -> str:
+        """Name of a group of elements of this dimension, its number where it has none."""
+        return self.names.get((dimension, int(group)), str(int(group)))
 
 
 def read_mesh(path: str | PathLike, scale: float = 1.0) -> MeshFile:
@@ -52,9 +57,14 @@ def read_mesh(path: str | PathLike, scale: float = 1.0) -> MeshFile:
     if not (np.isfinite(scale) and scale > 0.0):
         raise ValueError(f"scale must be positive and finite, got {scale}; 1e-3 is a file in millimetres")
     try:
-        mesh = meshio.read(path)
+        mesh = _quietly(meshio.read, path)
     except (Exception, SystemExit) as error:  # meshio raises whatever its readers stumble over, and may exit
+        other = _by_trimesh(path, scale)
+        if other is not None:
+            return other
         raise ValueError(f"{path}: not a mesh that meshio reads ({type(error).__name__}: {error})") from error
+    if not len(mesh.points) or not any(len(block.data) for block in mesh.cells):
+        raise ValueError(f"{path}: a mesh must have corners and cells, got {len(mesh.points)} corners and no cells")
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = scale * mesh.points
     if not np.isfinite(points).all():
@@ -70,5 +80,42 @@ def read_mesh(path: str | PathLike, scale: float = 1.0) -> MeshFile:
         points,
         {kind: np.concatenate(blocks) for kind, blocks in cells.items()},
         {kind: np.concatenate(blocks) for kind, blocks in groups.items()},
-        {int(tag): name for name, (tag, *_) in mesh.field_data.items()},
+        _names(mesh.field_data),
     )
+
+
+def _names(field_data: dict[str, Any]) -> dict[tuple[int, int], str]:
+    """Names of groups; those of files that tell no dimension count for lines and surfaces."""
+    found = {}
+    for name, given in field_data.items():
+        tag, *dimension = np.asarray(given).reshape(-1).tolist()
+        for of in dimension[:1] or (1, 2):
+            found[int(of), int(tag)] = name
+    return found
+
+
+def _by_trimesh(path: str | PathLike, scale: float) -> MeshFile | None:
+    """What trimesh makes of a file that meshio cannot read: triangles without groups; None if it cannot either."""
+    try:
+        import trimesh
+
+        mesh = _quietly(trimesh.load_mesh, path, process=False)
+        points, triangles = scale * np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=int)
+    except Exception:  # as meshio it raises what its readers stumble over, and it may not be installed
+        return None
+    if not len(triangles) or points.shape[1:] != (3,) or not np.isfinite(points).all():
+        return None
+    return MeshFile(points, {"triangle": triangles}, {"triangle": np.full(len(triangles), -1)}, {})
+
+
+def _quietly(read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """What a reader returns, without what it prints and warns."""
+    heard = io.StringIO()
+    with (
+        contextlib.redirect_stdout(heard),
+        contextlib.redirect_stderr(heard),
+        warnings.catch_warnings(),
+        np.errstate(all="ignore"),
+    ):
+        warnings.simplefilter("ignore")
+        return read(*arguments, **options)

@@ -202,4 +202,4 @@ def read_outline(path: str | PathLike, scale: float = 1.0) -> Outline:
         segments = distinct[(times == 1) & (distinct[:, 0] != distinct[:, 1])]
     else:
         segments = whole
-    return Outline(points, segments, {file.patch(k): whole[groups == k] for k in np.unique(groups) if k >= 0})
+    return Outline(points, segments, {file.patch(k, 1): whole[groups == k] for k in np.unique(groups) if k >= 0})

@@ -1,6 +1,7 @@
 """Closed triangle surfaces read from mesh files, and the distance to them."""
 
 import functools
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -10,10 +11,14 @@ import numpy as np
 import warp as wp
 
 from ..execution import Launcher
+from .faces import SURFACES, outer_triangles, surface_triangles, weld
 from .mesh_file import MeshFile, read_mesh
 
-# Faces of a tetrahedron, outwards for one of positive volume.
-TETRA_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+# Corners nearer than this share of the size of a file are one where a surface is not closed otherwise: CAD programs
+# write each facet by itself, rounded to single precision.
+WELD = 1e-6
+# Points at which closed surfaces are asked whether they lie in each other.
+_ASKED = 4096
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Surface:
     Attributes:
         points: corners [m], (k, 3), each once.
         triangles: numbers of their corners, (m, 3).
-        patches: name -> which triangles belong to it, (m,) bool; the numbered or named groups of the file.
+        patches: name -> corners of the triangles of it, (l, 3); the numbered or named groups of the file.
     """
 
     points: np.ndarray
@@ -36,21 +41,82 @@ class Surface:
         corners = (self.points - self.points.mean(axis=0))[self.triangles]
         return float(np.einsum("mi,mi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
 
-    def check_closed(self, who: str) -> None:
-        """Raise ValueError unless every edge borders two triangles that turn the same way."""
+    def simplified(self) -> "Surface":
+        """Without what repeats: a triangle that is there twice, and two that are each other's back.
+
+        Two solids that share a face become one.
+        """
+        low = np.argmin(self.triangles, axis=1)
+        turned = np.take_along_axis(self.triangles, (low[:, None] + np.arange(3)) % 3, axis=1)  # the same sense
+        kept = np.sort(np.unique(turned, axis=0, return_index=True)[1])
+        once = self.triangles[kept]
+        _, group, times = np.unique(np.sort(once, axis=1), axis=0, return_inverse=True, return_counts=True)
+        return Surface(self.points, once[times[group.reshape(-1)] == 1], self.patches)
+
+    def open_edges(self) -> np.ndarray:
+        """Edges, (k, 2), along which not as many triangles turn one way as the other; none of a closed surface."""
         edges = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        there, there_times = np.unique(edges, axis=0, return_counts=True)
-        both = np.concatenate([there, there[:, ::-1]])
-        _, times = np.unique(both, axis=0, return_counts=True)
-        unmatched = int((times == 1).sum()) // 2 + int((there_times > 1).sum())
-        if unmatched:
-            back = {tuple(edge) for edge in there[:, ::-1].tolist()}
-            lone = [edge for edge in there.tolist() if tuple(edge) not in back]
-            where = "" if not lone else f", the first at {self.points[lone[0][0]]} m"
+        ways = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+        distinct, place = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+        return distinct[np.bincount(place.reshape(-1), ways, len(distinct)) != 0.0]
+
+    def check_closed(self, who: str) -> None:
+        """Raise ValueError unless as many triangles turn one way along every edge as the other."""
+        edges = self.open_edges()
+        if len(edges):
             raise ValueError(
-                f"{who}: the surface must be closed and its triangles turn the same way, got {unmatched} edges that "
-                f"do not border two such triangles{where}; close holes and unify normals in a mesh tool"
+                f"{who}: the surface must be closed and its triangles turn the same way, got {len(edges)} edges that "
+                f"do not border two such triangles, the first at {self.points[edges[0, 0]]} m; close holes and unify "
+                "normals in a mesh tool"
             )
+
+    def check_apart(self, who: str) -> None:
+        """Raise ValueError where closed parts of the surface lie in each other and what is inside is not told by them.
+
+        Looked for at points in the boxes that two parts have in common; a part that faces inwards is a hollow.
+        """
+        parts = self.parts()
+        if len(parts) < 2:
+            return
+        corners = [part.points[part.triangles].reshape(-1, 3) for part in parts]
+        boxes = [(places.min(axis=0), places.max(axis=0)) for places in corners]
+        inward = np.sign([part.volume for part in parts]) != np.sign(self.volume)
+        queries: dict[int, Any] = {}
+        for i, j in itertools.combinations(range(len(parts)), 2):
+            low, high = np.maximum(boxes[i][0], boxes[j][0]), np.minimum(boxes[i][1], boxes[j][1])
+            if not (high - low > WELD * np.ptp(corners[i], axis=0).max()).all():
+                continue
+            x = np.random.default_rng(0).uniform(low, high, (_ASKED, 3))
+            times = np.zeros(len(x))
+            for k, (lower, upper) in enumerate(boxes):
+                if (lower < high).all() and (upper > low).all():
+                    turned = parts[k] if parts[k].volume > 0.0 else parts[k].turned()
+                    query = queries.setdefault(k, turned.query(winding=True))
+                    times += np.where(inward[k], -1.0, 1.0) * (query(x)[0] > 0.0)
+            wrong = (times < -0.5) | (times > 1.5)
+            if wrong.any():
+                raise ValueError(
+                    f"{who}: closed surfaces of a mesh must not lie in each other, got two that do at {x[wrong][0]} m; "
+                    "unite them in a mesh tool, or turn the inner one to face inwards for a hollow"
+                )
+
+    def turned(self) -> "Surface":
+        """Facing the other way."""
+        return Surface(self.points, self.triangles[:, ::-1], self.patches)
+
+    def parts(self) -> list["Surface"]:
+        """The pieces that hang together by corners."""
+        labels = np.arange(len(self.points))
+        while True:
+            least = labels.copy()
+            for corner in range(3):
+                np.minimum.at(least, self.triangles[:, corner], labels[self.triangles].min(axis=1))
+            least = least[least]
+            if np.array_equal(least, labels):
+                break
+            labels = least
+        of = labels[self.triangles[:, 0]]
+        return [Surface(self.points, self.triangles[of == label], {}) for label in np.unique(of)]
 
     def part(self, patch: str) -> "Surface":
         """The triangles of a patch.
@@ -60,7 +126,7 @@ class Surface:
         """
         if patch not in self.patches:
             raise ValueError(f"patch of the mesh must be one of {sorted(self.patches)}, got {patch!r}")
-        return Surface(self.points, self.triangles[self.patches[patch]], {})
+        return Surface(self.points, self.patches[patch], {})
 
     def query(self, winding: bool) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Function of positions [m], (k, 3) -> distance [m], (k,), and unit vectors along which it grows, (k, 3).
@@ -115,9 +181,10 @@ def _make_query(winding: bool) -> Any:
 
 
 def read_surface(path: str | PathLike, scale: float = 1.0) -> Surface:
-    """The triangles of a mesh file that meshio reads.
+    """The surface of a mesh file: the outer faces of its solid elements, or else its surface elements.
 
-    Quadrangles are cut in two; of tetrahedra the outer faces are taken, unless the file has surface elements.
+    Quadrangles are cut in two, elements of second order at their midside nodes. Corners that are one to the last bit
+    are one; where the surface is not closed so or in parts, those nearer than 1e-6 of its size.
 
     Args:
         path: the file.
@@ -125,41 +192,46 @@ def read_surface(path: str | PathLike, scale: float = 1.0) -> Surface:
 
     Raises:
         ModuleNotFoundError, OSError: as ``read_mesh``.
-        ValueError: as ``read_mesh``, or without triangles, quadrangles or tetrahedra.
+        ValueError: as ``read_mesh``, or without elements that have a surface.
     """
     file = read_mesh(path, scale)
-    triangles, numbers = _triangles(file)
+    groups = _groups(file)
+    outer = outer_triangles(file.points, file.cells)
+    triangles = outer if len(outer) else np.concatenate([np.zeros((0, 3), dtype=int), *groups.values()])
     if not len(triangles):
         kinds = sorted(file.cells)
         raise ValueError(f"{path}: a mesh must have triangles, quadrangles or tetrahedra, got cells {kinds}")
     # Each corner once, as files of single facets (STL) repeat them.
     points, places = np.unique(file.points, axis=0, return_inverse=True)
-    triangles = places.reshape(-1)[triangles]
-    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    patches = {file.patch(k): numbers[whole] == k for k in np.unique(numbers) if k >= 0}
-    return Surface(points, triangles[whole], patches)
+    surface = _welded(points, places.reshape(-1), triangles, groups)
+    if len(surface.open_edges()) or len(surface.parts()) > 1:
+        used = points[np.unique(places.reshape(-1)[triangles])]
+        same = weld(points, WELD * float(np.ptp(used, axis=0).max()))
+        first = np.unique(same, return_index=True)[1]
+        near = _welded(points[first], same[places.reshape(-1)], triangles, groups)
+        if not len(near.open_edges()) and len(near.triangles):
+            return near
+    return surface
 
 
-def _triangles(file: MeshFile) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (m, 3) and the number of the group of each, (m,)."""
-    faces, numbers = [np.zeros((0, 3), dtype=int)], [np.zeros(0, dtype=int)]
-    if "triangle" in file.cells:
-        faces.append(file.cells["triangle"])
-        numbers.append(file.groups["triangle"])
-    if "quad" in file.cells:
-        faces.append(file.cells["quad"][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3))
-        numbers.append(np.repeat(file.groups["quad"], 2))
-    if len(faces) == 1 and "tetra" in file.cells:
-        faces.append(_outer_faces(file.points, file.cells["tetra"]))
-        numbers.append(np.full(len(faces[-1]), -1))
-    return np.concatenate(faces), np.concatenate(numbers)
+def _welded(points: np.ndarray, places: np.ndarray, triangles: np.ndarray, groups: dict[str, np.ndarray]) -> Surface:
+    """The surface whose corners have these new numbers; triangles that lost their area so are left out."""
+
+    def renumbered(those: np.ndarray) -> np.ndarray:
+        those = places[those]
+        return those[(those != np.roll(those, 1, axis=1)).all(axis=1)]
+
+    patches = {name: renumbered(those) for name, those in groups.items() if name}
+    return Surface(points, renumbered(triangles), patches).simplified()
 
 
-def _outer_faces(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """Faces that belong to one tetrahedron only, outwards."""
-    edges = points[tetrahedra[:, 1:]] - points[tetrahedra[:, :1]]
-    turned = np.einsum("mi,mi->m", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) < 0.0
-    tetrahedra = np.where(turned[:, None], tetrahedra[:, [0, 2, 1, 3]], tetrahedra)
-    faces = tetrahedra[:, TETRA_FACES].reshape(-1, 3)
-    _, first, times = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return faces[first[times == 1]]
+def _groups(file: MeshFile) -> dict[str, np.ndarray]:
+    """Triangles of the surface elements by the name of their group, (l, 3); without one by the empty name."""
+    found: dict[str, list[np.ndarray]] = {}
+    for kind in (kind for kind in file.cells if kind in SURFACES):
+        triangles, of = surface_triangles(kind, file.cells[kind])
+        numbers = file.groups[kind][of]
+        for number in np.unique(numbers):
+            name = file.patch(number, 2) if number >= 0 else ""
+            found.setdefault(name, []).append(triangles[numbers == number])
+    return {name: np.concatenate(listed) for name, listed in found.items()}

@@ -1,6 +1,5 @@
 """What a run leaves on disk and says about itself; the only room that knows HDF5."""
 
-from .checkpoint import DamagedError
 from .directory import BusyError, RunDirectory
 from .fields import FIELDS, TRANSPORT_FIELDS
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
@@ -9,6 +8,7 @@ from .record import ChangedCaseError, Outcome, record
 from .recording import Recording
 from .recover import Findings, check, recover
 from .report import Figure, table
+from .sealed import DamagedError
 from .series import SnapshotWriter
 from .snapshot import Snapshot, read_snapshot, write_snapshot
 from .stopping import Stop

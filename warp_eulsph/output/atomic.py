@@ -3,8 +3,26 @@
 Everything that a run writes goes through here, so that one test can fail every write, fsync and rename there is.
 """
 
+import errno
 import os
+import secrets
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
+
+# What files are called until they are whole; nobody else's are, and a name that is taken is never opened.
+_TEMPORARY = ".warp_eulsph.tmp"
+
+
+def temporary_beside(path: Path) -> Path:
+    """A name for a file that will be moved to ``path``; nothing is there."""
+    return path.with_name(f".{secrets.token_hex(8)}{_TEMPORARY}")
+
+
+def left_behind(folder: Path) -> Iterator[Path]:
+    """Temporary files that a killed run left in a folder, which is no link."""
+    if folder.is_dir() and not folder.is_symlink():
+        yield from (path for path in folder.glob(f".*{_TEMPORARY}") if path.is_file() and not path.is_symlink())
 
 
 def replace_file(path: Path, *parts: bytes | memoryview) -> None:
@@ -15,9 +33,9 @@ def replace_file(path: Path, *parts: bytes | memoryview) -> None:
     Raises:
         OSError: the file cannot be written, forced to disk or moved.
     """
-    temporary = path.with_name(path.name + ".tmp")
+    temporary = temporary_beside(path)
     try:
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         try:
             for part in parts:
                 _write_all(descriptor, part)
@@ -53,15 +71,47 @@ def append_line(path: Path, line: str) -> None:
 
 
 def move(source: Path, destination: Path) -> None:
-    """Move a file within a file system, its folder made where it is missing; the destination must not be there.
+    """Move a file or folder, its new folder made where it is missing; the destination must not be there.
+
+    Where both are on different disks it is copied, forced to disk, and removed only then.
 
     Raises:
         OSError: the move was refused; the file is where it was.
     """
     destination.parent.mkdir(parents=True, exist_ok=True)
-    os.replace(source, destination)
+    try:
+        os.replace(source, destination)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        _copy(source, destination)
+        if source.is_dir() and not source.is_symlink():
+            shutil.rmtree(source)
+        else:
+            source.unlink()
     synchronise(destination.parent)
     synchronise(source.parent)
+
+
+def _copy(source: Path, destination: Path) -> None:
+    """Copy to another disk, whole or not at all."""
+    temporary = temporary_beside(destination)
+    try:
+        if source.is_dir() and not source.is_symlink():
+            shutil.copytree(source, temporary, symlinks=True)
+            for path in [*temporary.rglob("*"), temporary]:
+                if not path.is_symlink():
+                    synchronise(path)
+        else:
+            shutil.copy2(source, temporary, follow_symlinks=False)
+            if not temporary.is_symlink():
+                synchronise(temporary)
+        os.replace(temporary, destination)
+    finally:
+        if temporary.is_dir() and not temporary.is_symlink():
+            shutil.rmtree(temporary)
+        else:
+            temporary.unlink(missing_ok=True)
 
 
 def synchronise(path: Path) -> None:

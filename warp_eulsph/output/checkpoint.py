@@ -8,6 +8,7 @@ bit of it lies outside the digest.
 import hashlib
 import json
 import logging
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,17 +17,15 @@ from typing import Any
 import numpy as np
 
 from .atomic import replace_file
+from .directory import numbered
 from .fields import Recorded
+from .sealed import DamagedError
 
 log = logging.getLogger(__name__)
 
 FORMAT = b"warp_eulsph checkpoint 1\n"
 KEPT = 2
 _DIGEST = hashlib.sha256().digest_size
-
-
-class DamagedError(ValueError):
-    """A checkpoint that is not what was written."""
 
 
 @dataclass(frozen=True)
@@ -85,15 +84,23 @@ def decode(content: bytes) -> Checkpoint:
         raise DamagedError(f"its SHA-256 does not fit its {len(content)} bytes")
     if not content.startswith(FORMAT):
         raise DamagedError(f"it begins with {content[: len(FORMAT)]!r}, not with {FORMAT!r}; another version wrote it")
-    end = content.index(b"\n", len(FORMAT)) + 1
-    header = json.loads(content[len(FORMAT) : end])
-    arrays = {}
-    for name, dtype, shape in header["arrays"]:
-        count = int(np.prod(shape))
-        arrays[name] = np.frombuffer(content, dtype, count, end).reshape(shape)
-        end += arrays[name].nbytes
-    rest = {name: header[name] for name in ("time", "step", "counters", "description", "environment")}
-    return Checkpoint(arrays=arrays, **rest)
+    try:
+        end = content.index(b"\n", len(FORMAT)) + 1
+        header = json.loads(content[len(FORMAT) : end])
+        arrays = {}
+        for name, dtype, shape in header["arrays"]:
+            count = math.prod(shape)
+            if np.dtype(dtype).kind not in "iuf" or not 0 <= count <= len(content) or min(shape, default=0) < 0:
+                raise ValueError(f"array {name!r} of type {dtype} and shape {shape}")
+            arrays[name] = np.frombuffer(content, dtype, count, end).reshape(shape)
+            end += arrays[name].nbytes
+        rest = {name: header[name] for name in ("time", "step", "counters", "description", "environment")}
+        checkpoint = Checkpoint(arrays=arrays, **rest)
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise DamagedError(f"its digest fits, and its content is none of a checkpoint: {error}") from None
+    if not isinstance(checkpoint.step, int) or not isinstance(checkpoint.time, float | int):
+        raise DamagedError("its digest fits, and its step and time are no numbers")
+    return checkpoint
 
 
 class Checkpoints:
@@ -108,7 +115,7 @@ class Checkpoints:
 
     def paths(self) -> list[Path]:
         """The files, oldest first."""
-        return sorted(self.folder.glob("*.ckpt"))
+        return numbered(self.folder, ".ckpt")
 
     def write(self, checkpoint: Checkpoint) -> Path:
         """Add one and drop what is older than the last two; its path.
@@ -133,7 +140,7 @@ class Checkpoints:
         for path in reversed(self.paths()):
             try:
                 checkpoint = decode(path.read_bytes())
-            except DamagedError as error:
+            except (DamagedError, OSError) as error:
                 damaged.append(f"{path}: {error}")
                 log.warning("checkpoint %s is damaged: %s; trying the one before", path, error)
                 continue

@@ -7,7 +7,7 @@
     run.vtkhdf, .series      one file over all snapshots, and a list of them, for ParaView
     ckpt/0000001200.ckpt     the last two checkpoints
     log.jsonl                energies, momenta, extrema, one line per look
-    probes/NAME/…h5          tables of the probes, never changed once they are there
+    probes/NAME/…h5          tables of the probes, never changed once they are there; probes.jsonl one line per piece
     run.json                 what is run, with all defaults; env.json versions and device; status.json how it ended
     case.toml, case.py       the case, to be run again
     abandoned/0001/          what an earlier run left, or steps that a resumed run takes again
@@ -15,32 +15,52 @@
 
 import contextlib
 import json
+import logging
 import os
 from collections.abc import Iterable, Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from .atomic import move, replace_file
+from .atomic import left_behind, move, replace_file
+from .sealed import DamagedError, read_text, seal, unseal
 
+log = logging.getLogger(__name__)
+
+#: The list of all pieces of tables.
+PIECES = "probes.jsonl"
+# In the order in which they move away: as long as something is left, snapshots or run.json say whose it is.
 _TOP = (
-    "snap",
     "manifest.jsonl",
     "run.vtkhdf",
     "run.vtkhdf.series",
     "ckpt",
     "log.jsonl",
     "probes",
-    "run.json",
+    PIECES,
     "case.toml",
     "case.py",
     "env.json",
     "status.json",
+    "snap",
+    "run.json",
 )
 
 
 # Those who only look whether somebody writes here hold the lock for a moment [s].
 _LOOK = 0.2
+
+
+def numbered(folder: Path, ending: str) -> list[Path]:
+    """Files of a folder that are named by a step, by that number; others are nobody's business here."""
+    if not folder.is_dir():
+        return []
+    found = [path for path in folder.iterdir() if path.suffix == ending and _is_number(path.stem) and path.is_file()]
+    return sorted(found, key=lambda path: (int(path.stem), path.name))
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) < 20
 
 
 class BusyError(RuntimeError):
@@ -57,14 +77,34 @@ class RunDirectory:
     def __init__(self, path: str | PathLike):
         self.path = Path(path)
         self.snapshots, self.checkpoints, self.probes = (self.path / name for name in ("snap", "ckpt", "probes"))
-        self.log, self.description = self.path / "log.jsonl", self.path / "run.json"
+        self.log, self.pieces, self.description = (self.path / name for name in ("log.jsonl", PIECES, "run.json"))
         self.environment, self.status = self.path / "env.json", self.path / "status.json"
         self.stop = self.path / "stop"  # made by a user who wants the run to stop
 
     @property
     def holds_a_run(self) -> bool:
         """Whether a run has begun here."""
-        return self.description.exists() or any(self.snapshots.glob("*.vtkhdf"))
+        return self.description.is_file() or bool(numbered(self.snapshots, ".vtkhdf"))
+
+    def check_own(self) -> None:
+        """Refuse to begin a run where files of its names are somebody else's.
+
+        Raises:
+            FileExistsError: it names them; nothing was touched.
+        """
+        there = [name for name in (*_TOP, self.stop.name) if os.path.lexists(self.path / name)]
+        if self.description.is_file():
+            try:
+                content, sealed = unseal(read_text(self.description))
+                foreign = not sealed and not {"simulation", "recording"} <= content.keys()
+            except DamagedError:
+                foreign = False  # as of a run that was damaged, which moves to abandoned
+        else:
+            foreign = bool(there) and not self.holds_a_run
+        if foreign:
+            raise FileExistsError(
+                f"{self.path} holds {', '.join(there)}, which no run left there; choose a directory of the run's own"
+            )
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -101,9 +141,11 @@ class RunDirectory:
         """Move all that a run left here into a new folder of ``abandoned/``; the folder, None if there was nothing.
 
         Raises:
+            FileExistsError: what is here is somebody else's.
             OSError: a move was refused; every file is in one of the two places.
         """
-        there = [self.path / name for name in _TOP if (self.path / name).exists()]
+        self.check_own()
+        there = [self.path / name for name in _TOP if os.path.lexists(self.path / name)]
         if not there:
             return None
         folder = self._abandoned()
@@ -119,10 +161,18 @@ class RunDirectory:
         Raises:
             OSError: a move was refused; every file is in one of the two places.
         """
-        for left in [*self.path.glob("*.tmp"), *self.path.glob("*/*.tmp"), *self.probes.glob("*/*.tmp")]:
-            left.unlink()  # of a file that a killed run was writing
-        files = [*self.snapshots.glob("*.vtkhdf"), *self.checkpoints.glob("*.ckpt"), *self.probes.glob("*/*.h5")]
+        for folder in (self.path, self.snapshots, self.checkpoints, *self.tables):
+            for left in left_behind(folder):
+                left.unlink()  # of a file that a killed run was writing
+        files = numbered(self.snapshots, ".vtkhdf") + numbered(self.checkpoints, ".ckpt")
+        files += [path for folder in self.tables for path in numbered(folder, ".h5")]
         return self.set_aside(path for path in files if int(path.stem) > step)
+
+    @property
+    def tables(self) -> list[Path]:
+        """Folders of the probes' tables."""
+        there = sorted(self.probes.iterdir()) if self.probes.is_dir() else []
+        return [path for path in there if path.is_dir() and not path.is_symlink()]
 
     def set_aside(self, files: Iterable[Path]) -> Path | None:
         """Move files of the run into a new folder of ``abandoned/``; the folder, None if there was nothing.
@@ -142,14 +192,24 @@ class RunDirectory:
         """Content of one of the JSON files; empty if it is not there.
 
         Raises:
-            ValueError: not JSON.
+            DamagedError: not what was written.
+            OSError: it cannot be read.
         """
         if not path.exists():
             return {}
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise ValueError(f"{path} is damaged: {error}") from None
+            return unseal(read_text(path))[0]
+        except DamagedError as error:
+            raise DamagedError(f"{path} is damaged: {error}") from None
+
+    def salvage(self, path: Path) -> dict[str, Any]:
+        """``read``, but what is damaged is set aside with a warning, and counts as not there."""
+        try:
+            return self.read(path)
+        except DamagedError as error:
+            log.warning("%s; it is set aside, and the run goes on without it", error)
+            self.set_aside([path])
+            return {}
 
     def write(self, path: Path, content: dict[str, Any]) -> None:
         """Replace one of the JSON files.
@@ -157,7 +217,7 @@ class RunDirectory:
         Raises:
             OSError: the disk refused; the file is as it was.
         """
-        replace_file(path, (json.dumps(content, indent=1) + "\n").encode())
+        replace_file(path, (json.dumps(seal(content), indent=1) + "\n").encode())
 
     def keep(self, name: str, text: str) -> None:
         """Replace ``case.toml`` or ``case.py``.
@@ -169,7 +229,7 @@ class RunDirectory:
 
     def _abandoned(self) -> Path:
         folder = self.path / "abandoned"
-        taken = [int(path.name) for path in folder.glob("[0-9]*")] if folder.exists() else []
+        taken = [int(path.name) for path in folder.iterdir() if _is_number(path.name)] if folder.is_dir() else []
         made = folder / f"{max(taken, default=0) + 1:04d}"
         os.makedirs(made)
         return made

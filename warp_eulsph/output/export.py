@@ -10,8 +10,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from .atomic import temporary_beside
+from .hdf5 import DIGEST, read
 from .reader import RunFrame
-from .snapshot import read_snapshot
+from .snapshot import open_snapshot, read_snapshot
 from .temporal import write_layout
 from .vtu import write_pvd, write_vtu
 
@@ -46,7 +48,7 @@ def export(frames: Sequence[RunFrame], target: str | PathLike, fields: Sequence[
     if unknown:
         raise ValueError(f"fields must be among {held}, got {unknown}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".tmp")
+    temporary = temporary_beside(path)
     try:
         FORMATS[path.suffix](temporary, path, [frame.path for frame in frames], names)
         os.replace(temporary, path)
@@ -99,15 +101,13 @@ def _write_npz(temporary: Path, target: Path, files: list[Path], names: list[str
 
 
 def _write_xdmf(temporary: Path, target: Path, files: list[Path], names: list[str]) -> None:
-    import h5py
-
     root = ElementTree.Element("Xdmf", Version="3.0")
     domain = ElementTree.SubElement(root, "Domain")
     series = ElementTree.SubElement(domain, "Grid", Name="particles", GridType="Collection", CollectionType="Temporal")
     for path in files:
         place = os.path.relpath(path.absolute(), target.parent.absolute())
-        with h5py.File(path, "r") as file:
-            points, data = file["VTKHDF/Points"], file["VTKHDF/PointData"]
+        with open_snapshot(path) as (file, data):
+            points = file["VTKHDF/Points"]
             grid = ElementTree.SubElement(series, "Grid", Name=f"step {int(file.attrs['step'])}", GridType="Uniform")
             ElementTree.SubElement(grid, "Time", Value=repr(float(file.attrs["time"])))
             count = str(len(points))
@@ -143,17 +143,17 @@ def _write_vtkhdf(temporary: Path, target: Path, files: list[Path], names: list[
 
     counts, times, steps = [], [], []
     for path in files:
-        with h5py.File(path, "r") as file:
+        with open_snapshot(path) as (file, _):
             counts.append(len(file["VTKHDF/Points"]))
             times.append(float(file.attrs["time"]))
             steps.append(int(file.attrs["step"]))
     with h5py.File(temporary, "w", libver=("earliest", "v110")) as out:
         root = write_layout(out, np.array(counts, dtype=np.int64), times, steps, names)
         for path in files:
-            with h5py.File(path, "r") as file:
+            with open_snapshot(path) as (file, data):
                 _append(root, "Points", file["VTKHDF/Points"])
                 for name in names:
-                    _append(root["PointData"], name, file["VTKHDF/PointData"][name])
+                    _append(root["PointData"], name, data[name])
 
 
 def _append(group: Any, name: str, source: Any) -> None:
@@ -163,10 +163,11 @@ def _append(group: Any, name: str, source: Any) -> None:
         chunks = (max(1, min(len(source), 65536)), *source.shape[1:])
         made = group.create_dataset(name, shape, source.dtype, maxshape=(None, *source.shape[1:]), chunks=chunks)
         for key, value in source.attrs.items():
-            made.attrs[key] = value
+            if key != DIGEST:  # which is of one frame
+                made.attrs[key] = value
     rows = len(group[name])
     group[name].resize(rows + len(source), axis=0)
-    group[name][rows:] = source[()]
+    group[name][rows:] = read(source)
 
 
 Writer = Callable[[Path, Path, list[Path], list[str]], None]

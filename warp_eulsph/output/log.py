@@ -1,14 +1,17 @@
 """The log of a run: energies, momenta and extrema, or amounts of a transported quantity; a line of JSON per look."""
 
-import json
+import logging
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..simulation import Simulation
-from .atomic import append_line, replace_file
+from .atomic import append_line
 from .fields import Recorded
+from .sealed import read_lines, sealed_line
+
+log = logging.getLogger(__name__)
 
 
 def look(simulation: Recorded) -> dict[str, Any]:
@@ -33,32 +36,14 @@ def append(path: Path, lines: list[dict[str, Any]]) -> None:
         OSError: the disk refused; the file is as it was.
     """
     if lines:
-        append_line(path, "\n".join(json.dumps(line) for line in lines))
-
-
-def read_lines(path: Path) -> list[dict[str, Any]]:
-    """The lines of a log; one that was cut short, and what follows it, is left out."""
-    lines = []
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        try:
-            lines.append(json.loads(line))
-        except ValueError:
-            break
-    return lines
-
-
-def cut(path: Path, step: int) -> None:
-    """Drop the lines of steps after ``step``, and what is damaged.
-
-    Raises:
-        OSError: the disk refused; the file is as it was.
-    """
-    if path.exists():
-        kept = [json.dumps(line) + "\n" for line in read_lines(path) if line["step"] <= step]
-        replace_file(path, "".join(kept).encode())
+        append_line(path, "\n".join(sealed_line(line) for line in lines))
 
 
 def read_log(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a log, (lines,) each, momenta (lines, components)."""
-    lines = read_lines(path)
-    return {name: np.array([line[name] for line in lines]) for name in (lines[0] if lines else {})}
+    """The columns of a log, (lines,) each, momenta (lines, components); damaged lines are left out, with a warning."""
+    lines = read_lines(path, ("step", "t"))
+    if lines.damaged:
+        log.warning("%s: lines %s are damaged and left out", path, lines.damaged)
+    columns = lines.whole[0].keys() if lines.whole else ()
+    alike = [line for line in lines.whole if line.keys() == columns]
+    return {name: np.array([line[name] for line in alike]) for name in columns}

@@ -1,6 +1,7 @@
 """Probes: figures of a run at a place, of a body, of a condition or across a plane, each to a table of its own."""
 
 import re
+import unicodedata
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,9 @@ from ..schedule import EverySteps, Schedule
 from ..simulation import Simulation
 from .shape_functions import shape_functions
 from .stress import body_stress, stresses
+
+# Bytes of a name; file systems take 255.
+LONGEST_NAME = 200
 
 #: Figures of the present state, by name; the same names and shapes every time.
 Measure = Callable[[], dict[str, Any]]
@@ -35,8 +39,13 @@ class Probe(ABC):
     units: ClassVar[dict[str, str]]
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"[\w-]+", self.name):
+        if not isinstance(self.name, str) or not re.fullmatch(r"[\w-]+", self.name):
             raise ValueError(f"probe name must be of letters, digits, - and _, got {self.name!r}")
+        if unicodedata.normalize("NFKC", self.name) != self.name or len(self.name.encode()) > LONGEST_NAME:
+            raise ValueError(
+                f"probe name must be of plain letters and at most {LONGEST_NAME} bytes, for it names a folder, got "
+                f"{self.name!r}"
+            )
 
     @abstractmethod
     def bind(self, simulation: Simulation) -> Measure:

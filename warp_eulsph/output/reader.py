@@ -1,5 +1,6 @@
 """A run read back: ``Run("runs/column")[-1].F``."""
 
+import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,9 +11,10 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from .. import weights
-from .directory import RunDirectory
+from .directory import RunDirectory, numbered
 from .log import read_log
 from .manifest import Entry, Manifest
+from .sealed import DamagedError
 from .shape_functions import shape_functions
 from .snapshot import read_field, read_units
 from .tables import read_table
@@ -20,6 +22,8 @@ from .tensors import padded
 
 if TYPE_CHECKING:
     import xarray
+
+log = logging.getLogger(__name__)
 
 #: Units of the fields that a frame derives from those it holds.
 DERIVED = {
@@ -71,11 +75,16 @@ class RunFrame:
     def __getitem__(self, name: str) -> np.ndarray:
         """A field of the file by its name, ``x`` the positions [m]: (N,), (N, dim) or (N, dim, dim).
 
+        Values are read-only, and compared with their digest.
+
         Raises:
             KeyError: the file has no such field.
+            DamagedError: it is not what was written.
         """
         if name not in self._fields:
-            self._fields[name] = read_field(self.path, name)
+            values = read_field(self.path, name)
+            values.setflags(write=False)  # it is kept, and read again
+            self._fields[name] = values
         return self._fields[name]
 
     @property
@@ -236,10 +245,11 @@ class Run(Sequence[RunFrame]):
         manifest = Manifest(self.directory.path)
         try:
             manifest.read()
-        except ValueError:
-            manifest.examine()
+        except DamagedError as error:
+            log.warning("%s; the snapshots are read instead", error)
+            manifest.examine(thorough=False)
         if not manifest.entries:
-            manifest.examine()
+            manifest.examine(thorough=False)
         self._entries = manifest.entries
 
     def __repr__(self) -> str:
@@ -264,8 +274,10 @@ class Run(Sequence[RunFrame]):
 
     def _smoothing(self) -> Smoothing:
         simulation = self.description.get("simulation", {})
-        weight = getattr(weights, simulation.get("weight", ""), weights.CubicSpline)
-        return Smoothing(weight(), tuple(simulation.get("periodic", ())))
+        named = simulation.get("weight")
+        weight = getattr(weights, named, None) if isinstance(named, str) else None
+        known = isinstance(weight, type) and issubclass(weight, weights.Weight) and weight is not weights.Weight
+        return Smoothing(weight() if known else weights.CubicSpline(), tuple(simulation.get("periodic", ())))  # type: ignore[misc]
 
     def at(self, time: float) -> RunFrame:
         """The frame nearest to ``time`` [s]."""
@@ -319,7 +331,7 @@ class Run(Sequence[RunFrame]):
     @property
     def probe_names(self) -> list[str]:
         """Names of the probes that have tables."""
-        return sorted(path.name for path in self.directory.probes.glob("*") if any(path.glob("*.h5")))
+        return [path.name for path in self.directory.tables if numbered(path, ".h5")]
 
     @property
     def description(self) -> dict[str, Any]:

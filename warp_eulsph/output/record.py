@@ -1,11 +1,13 @@
 """The run that is kept: steps, what is written on the way, and how it is taken up again."""
 
+import hashlib
 import logging
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,14 +15,16 @@ import numpy as np
 from ..schedule import next_target
 from ..scheme.health import UnstableError
 from ..transport import Transport
+from .atomic import replace_file
 from .checkpoint import Checkpoint, Checkpoints, take
 from .description import describe, differences, plain
 from .directory import RunDirectory
 from .environment import environment
 from .fields import Recorded, chosen_fields
-from .log import append, cut, look
+from .log import append, look
 from .probes import Measure
 from .recording import Recording
+from .sealed import DamagedError, read_lines, sealed_line
 from .series import SnapshotWriter
 from .snapshot import Frame
 from .stopping import Stop
@@ -85,7 +89,7 @@ def record(
 
     Raises:
         BusyError: another run writes into the directory.
-        FileExistsError: a run is there, and neither ``resume`` nor ``replace`` is set.
+        FileExistsError: a run is there, and neither ``resume`` nor ``replace`` is set; or other files.
         ChangedCaseError: the case has changed since the checkpoint; it names the changes.
         DamagedError: no checkpoint is whole.
         BrokenError: the simulation was left in the middle of a step, and is not put where a checkpoint was.
@@ -101,6 +105,7 @@ def record(
         present = simulation.t if checkpoint is None else checkpoint.time
         if not (math.isfinite(until) and until >= present):
             raise ValueError(f"until must be finite and not before the present time {present} s, got {until}")
+        recording.schedule.check(present, until)
         # What is wrong with fields, probes and region is told before files move
         chosen_fields(recording.fields, simulation)
         measures = _measures(simulation, recording)
@@ -108,11 +113,13 @@ def record(
         description = _description(simulation, recording, particles)
         if resume and checkpoint is None and home.holds_a_run:
             log.warning("%s has no checkpoint: the run starts anew, what is there moves to abandoned", home.path)
+        digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in files.items()}
+        content = {"until": until, "case": dict(case or {}), "files": digests, **description}
         if checkpoint is None:
-            _begin(home, simulation, replace=replace or resume)
+            _begin(home, simulation, content, replace=replace or resume)
         else:
             _go_on(home, simulation, description, checkpoint, force=force)
-        home.write(home.description, {"until": until, "case": dict(case or {}), **description})
+            home.write(home.description, content)
         for name, text in files.items():
             home.keep(name, text)
         snapshots = SnapshotWriter(home.path, recording.fields, dtype=recording.dtype, particles=particles, resume=True)
@@ -131,11 +138,12 @@ def _measures(simulation: Recorded, recording: Recording) -> list[Measure]:
     return [probe.bind(simulation) for probe in recording.probes]
 
 
-def _begin(home: RunDirectory, simulation: Recorded, *, replace: bool) -> None:
+def _begin(home: RunDirectory, simulation: Recorded, content: dict[str, Any], *, replace: bool) -> None:
     """Make room for a new run."""
     if home.holds_a_run and not replace:
         raise FileExistsError(f"{home.path} holds a run; resume it, choose another directory, or replace it")
     home.abandon()
+    home.write(home.description, content)  # first, for it says whose all else is
     home.write(home.environment, {"sessions": [environment(simulation)]})
 
 
@@ -146,10 +154,28 @@ def _go_on(
     _compare(checkpoint, simulation, description, force)
     simulation.restore(checkpoint.arrays, checkpoint.counters)
     home.rewind(checkpoint.step)
-    cut(home.log, checkpoint.step)
-    sessions = home.read(home.environment).get("sessions", [])
-    home.write(home.environment, {"sessions": [*sessions, environment(simulation)]})
+    for listing in (home.log, home.pieces):
+        _cut(home, listing, checkpoint.step)
+    sessions = home.salvage(home.environment).get("sessions")
+    before = sessions if isinstance(sessions, list) else []
+    home.write(home.environment, {"sessions": [*before, environment(simulation)]})
     log.info("resumed at step %d, t = %.8g s", checkpoint.step, checkpoint.time)
+
+
+def _cut(home: RunDirectory, listing: Path, step: int) -> None:
+    """Drop the lines of steps after ``step``; a file with damaged lines is set aside too, as it was."""
+    try:
+        lines = read_lines(listing)
+    except DamagedError as error:
+        log.warning("%s is set aside: %s", listing, error)
+        home.set_aside([listing])
+        return
+    if lines.damaged:
+        log.warning("%s: lines %s are damaged and left out; the file as it was is set aside", listing, lines.damaged)
+        home.set_aside([listing])
+    if listing.exists() or lines.damaged:
+        kept = (f"{sealed_line(line)}\n" for line in lines.whole if line["step"] <= step)
+        replace_file(listing, "".join(kept).encode())
 
 
 def _description(simulation: Recorded, recording: Recording, particles: np.ndarray | None) -> dict[str, Any]:

@@ -62,7 +62,8 @@ class SnapshotWriter:
             RunDirectory(self.directory).abandon()
         (self.directory / "snap").mkdir(parents=True, exist_ok=True)
         if resume:
-            self.manifest.load()
+            damaged = self.manifest.load()
+            RunDirectory(self.directory).set_aside(self.directory / name for name in damaged)
             self._indexed = len(self.manifest.entries)
 
     @property

@@ -1,8 +1,9 @@
 """One frame, one immutable file: plain HDF5 that is a static VTKHDF PolyData too (ParaView, VTK, PyVista, h5py)."""
 
+import contextlib
 import functools
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -15,7 +16,12 @@ from ..fields import STATE
 from .atomic import replace_file
 from .copies import Copies, Copy
 from .fields import SOURCES, Recorded, SnapshotField, chosen_fields
+from .hdf5 import DIGEST, check_layout, digest_of_layout, member, names, opened, read, seal
+from .sealed import DamagedError
 from .tensors import padded
+
+# The key of the positions among the datasets of a snapshot; no field can have it.
+_POINTS = "/Points"
 
 
 @dataclass(frozen=True)
@@ -153,6 +159,7 @@ def encode(frame: Frame, dtype: np.dtype) -> bytes:
         points[:, :dim] = frame.x
         root["Points"] = points
         root["Points"].attrs["unit"] = STATE["x"].unit
+        seal(root["Points"], points)
         _write_cells(root, n)
         data = root.create_group("PointData")
         for name, value in values.items():
@@ -160,6 +167,8 @@ def encode(frame: Frame, dtype: np.dtype) -> bytes:
         _mark_active(data, values)
         root["FieldData/TimeValue"] = np.array([frame.time])  # the name VTK gives to a data set's time
         root["FieldData/Step"] = np.array([frame.step], dtype=np.int64)
+        datasets = {**{name: data[name] for name in values}, _POINTS: root["Points"]}
+        file.attrs[DIGEST] = digest_of_layout(file, datasets)
     return memory.getvalue()
 
 
@@ -184,6 +193,7 @@ def _write_field(data: Any, name: str, field: SnapshotField, value: np.ndarray, 
     dataset = data.create_dataset(name, data=stored)
     dataset.attrs["unit"], dataset.attrs["meaning"] = field.unit, field.meaning
     dataset.attrs["shape"] = np.array(shape, dtype=np.int64)
+    seal(dataset, stored)
 
 
 def _mark_active(data: Any, values: dict[str, np.ndarray]) -> None:
@@ -200,24 +210,24 @@ def read_snapshot(path: str | PathLike) -> Snapshot:
     Raises:
         OSError: no such file, or not HDF5.
         ValueError: HDF5, but not such a file.
+        DamagedError: not what was written.
     """
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        _check(path, file)
-        data = file["VTKHDF/PointData"]
+    with open_snapshot(path) as (file, data):
         fields = {name: _natural(dataset) for name, dataset in data.items()}
         units = {name: str(dataset.attrs["unit"]) for name, dataset in data.items()}
         return Snapshot(float(file.attrs["time"]), int(file.attrs["step"]), _positions(file), fields, units)
 
 
+def read_moment(path: str | PathLike) -> tuple[int, float, int]:
+    """Step, time [s] and number of particles of a snapshot; raises like ``read_snapshot``."""
+    with open_snapshot(path) as (file, _):
+        return int(file.attrs["step"]), float(file.attrs["time"]), len(file["VTKHDF/Points"])
+
+
 def read_units(path: str | PathLike) -> dict[str, str]:
     """Fields of a snapshot besides the positions, with their units; raises like ``read_snapshot``."""
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        _check(path, file)
-        return {name: str(dataset.attrs["unit"]) for name, dataset in file["VTKHDF/PointData"].items()}
+    with open_snapshot(path) as (_, data):
+        return {name: str(dataset.attrs["unit"]) for name, dataset in data.items()}
 
 
 def read_field(path: str | PathLike, name: str) -> np.ndarray:
@@ -226,30 +236,47 @@ def read_field(path: str | PathLike, name: str) -> np.ndarray:
     Raises:
         KeyError: the snapshot has no such field.
     """
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        _check(path, file)
+    with open_snapshot(path) as (file, data):
         if name == "x":
             return _positions(file)
-        if name not in file["VTKHDF/PointData"]:
-            raise KeyError(f"{path} holds no {name!r}, only {['x', *file['VTKHDF/PointData']]}")
-        return _natural(file["VTKHDF/PointData"][name])
+        if name not in data:
+            raise KeyError(f"{path} holds no {name!r}, only {['x', *data]}")
+        return _natural(data[name])
 
 
-def _check(path: str | PathLike, file: Any) -> None:
+@contextlib.contextmanager
+def open_snapshot(path: str | PathLike) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """The open file and the datasets of its fields by name; raises like ``read_snapshot``."""
+    with opened(path) as file:
+        yield file, _fields(path, file)
+
+
+def _fields(path: str | PathLike, file: Any) -> dict[str, Any]:
+    """Datasets of the fields by name, of a file whose layout is what was written."""
     missing = [key for key in ("time", "step", "dimension") if key not in file.attrs]
     if missing or "VTKHDF/PointData" not in file:
         raise ValueError(f"{path} is not a snapshot of this package: missing {missing or 'VTKHDF/PointData'}")
+    group, points = member(file, "VTKHDF/PointData"), member(file, "VTKHDF/Points")
+    data = {name: member(group, name) for name in names(group)}
+    check_layout(file, {**data, _POINTS: points})
+    dim = file.attrs["dimension"]
+    whole = len(points.shape) == 2 and points.shape[1] == 3 and dim in (1, 2, 3)
+    for dataset in data.values():
+        shape = np.asarray(dataset.attrs.get("shape"))
+        whole &= dataset.shape[:1] == points.shape[:1] and shape.dtype.kind == "i" and shape.ndim == 1
+        whole &= "unit" in dataset.attrs and len(shape) <= 2 and dataset.shape[1:] == ((), (3,), (9,))[len(shape)]
+    if not whole:
+        raise DamagedError(f"{path}: shapes of the fields are not those of a snapshot")
+    return data
 
 
 def _positions(file: Any) -> np.ndarray:
-    return file["VTKHDF/Points"][:, : int(file.attrs["dimension"])]
+    return read(member(file, "VTKHDF/Points"))[:, : int(file.attrs["dimension"])]
 
 
 def _natural(dataset: Any) -> np.ndarray:
     """Stored rows without the padding."""
-    stored, shape = dataset[()], tuple(int(i) for i in dataset.attrs["shape"])
+    stored, shape = read(dataset), tuple(int(i) for i in dataset.attrs["shape"])
     if len(shape) == 1:
         return stored[:, : shape[0]]
     if len(shape) == 2:

@@ -42,7 +42,7 @@ class Stop:
             return self._signal
         if time.monotonic() >= self._end:
             return f"wall limit of {self._wall:g} s"
-        if self._file is not None and self._file.exists():
+        if self._file is not None and self._file.is_file():
             self._file.unlink(missing_ok=True)
             return f"file {self._file}"
         return None

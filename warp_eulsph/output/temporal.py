@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from .atomic import replace_file
+from .hdf5 import DIGEST, member, opened, read
 from .manifest import Entry
+from .snapshot import open_snapshot
 
 _KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 
@@ -28,14 +30,25 @@ def write_index(path: Path, entries: Sequence[Entry]) -> None:
     replace_file(path, _encode(path.parent, entries))
 
 
+def read_times(path: Path) -> list[float]:
+    """Times [s] of an index.
+
+    Raises:
+        OSError: no such file, or not HDF5.
+        DamagedError: not an index.
+    """
+    with opened(path) as file:
+        return read(member(file, "VTKHDF/Steps/Values")).tolist()
+
+
 def _encode(directory: Path, entries: Sequence[Entry]) -> bytes:
     import h5py
 
     memory = io.BytesIO()
     counts = np.array([entry.particles for entry in entries], dtype=np.int64)
     firsts = np.cumsum([0, *counts[:-1]]).astype(np.int64)
-    with h5py.File(memory, "w", libver=("earliest", "v110")) as file, h5py.File(directory / entries[-1].name) as last:
-        source = last["VTKHDF/PointData"]
+    newest = directory / entries[-1].name
+    with h5py.File(memory, "w", libver=("earliest", "v110")) as file, open_snapshot(newest) as (last, source):
         times, steps = [entry.time for entry in entries], [entry.step for entry in entries]
         root = write_layout(file, counts, times, steps, list(source))
         _virtual(root, "Points", last["VTKHDF/Points"], entries, firsts)
@@ -105,4 +118,5 @@ def _virtual(group: Any, name: str, source: Any, entries: Sequence[Entry], first
         layout[first : first + entry.particles] = h5py.VirtualSource(entry.name, source.name, rows, source.dtype)
     made = group.create_virtual_dataset(name, layout, fillvalue=np.nan if source.dtype.kind == "f" else -1)
     for key, value in source.attrs.items():
-        made.attrs[key] = value
+        if key != DIGEST:  # which is of one frame
+            made.attrs[key] = value
