@@ -18,7 +18,7 @@ from ...scheme.reference import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 
-GRAVITY = 700.0  # m/s²
+GRAVITY = 800.0  # m/s²
 CUBE = NeoHookean(density=1000.0, young=1e6, poisson=0.3)
 END_TIME, FRAME = 0.3, 0.0025
 
