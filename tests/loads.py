@@ -4,7 +4,7 @@ import numpy as np
 import warp as wp
 
 import warp_eulsph as es
-from warp_eulsph.geometry import Relaxation, box, disc, sphere
+from warp_eulsph.geometry import Relaxation, Staggered, box, disc, sphere
 
 RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
 
@@ -87,8 +87,17 @@ def _print_faces():
         for shape, area, what in round_bodies:
             for n in (np.eye(shape[0].shape[1])[0], np.arange(1.0, 1.0 + shape[0].shape[1])):
                 n = n / np.linalg.norm(n)
-                force = -forces_of(shape, es.Pressure(1.0, lambda X, n=n: X @ n > 0)).sum(axis=0) @ n
-                print(f"  half {what} along the radius, {name}, along {np.round(n, 2)}: {force / area:.4f}")
+                half, cap = (
+                    -forces_of(shape, es.Pressure(1.0, lambda X, n=n, c=c: X @ n > c)).sum(axis=0) @ n / area
+                    for c in (0.0, 0.5)
+                )
+                cap /= 0.75 ** (0.5 * (len(n) - 1))
+                print(f"  {what} along the radius, {name}, along {np.round(n, 2)}: half {half:.4f}, cap {cap:.4f}")
+    flat = box((0, 0), (1, 0.33), 0.1, jitter=0.1, seed=3)
+    force = -forces_of(flat, es.Pressure(1.0, lambda X: X[:, 1] > 0.22, normal=(0, 1))).sum(axis=0)[1]
+    hexagonal = box((0, 0, 0), (1, 1, 1), 0.1, filling=Staggered())
+    along = -forces_of(hexagonal, es.Pressure(1.0, lambda X: X[:, 1] > 0.89, normal=(0, 1, 0))).sum(axis=0)[1]
+    print(f"  jittered cells of 0.1 × 0.11: {force:.4f}; staggered, nine layers across y: {along:.4f}")
 
 
 def _print_clamps():

@@ -25,6 +25,8 @@ EVEN, ROUGH = 0.45, 0.8
 STEPPED = 0.25
 # How far, by its cosine, a particle of a curved surface may look away from a normal and still belong to what faces it.
 RIM_SLOPE = 0.3
+# Radius within which the area vectors of a surface are summed to tell whether it faces a normal.
+SMOOTH = 3.0
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,13 @@ def find_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Fac
     tops = outermost(body, n)
     roughness = 0.0 if body.exact else roughness_of(body, tops, n, chosen)
     flat = roughness < ROUGH
-    if not flat and chosen[tops].any():
-        # those of the rim that look away a little have their share of the area vectors beneath the rim
-        tops, bottoms = sloping(body, n, -RIM_SLOPE), sloping(body, -n, RIM_SLOPE)
     held = chosen[tops]
+    if not flat and held.any():
+        # those that look away a little carry no load, but have their share of the area vectors beneath the rim
+        tops, bottoms = sloping(body, n, -RIM_SLOPE), sloping(body, -n, RIM_SLOPE)
+        a, b = pairs(body.x[tops], body.x[surface_particles(body)], SMOOTH * body.spacing)
+        mean = np.bincount(a, body.s[surface_particles(body)[b]] @ n)  # the steps of a cut lattice look anywhere
+        held = chosen[tops] & (mean > 0.0)
     if not held.any():
         raise ValueError(
             f"{who}: the region must hold outermost particles of a face along {row(n)}, it holds none of the body's "

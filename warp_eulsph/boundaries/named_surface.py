@@ -32,6 +32,10 @@ def find_surface(body: Surface, chosen: np.ndarray, who: str) -> tuple[np.ndarra
             "extend it to the surface, or use BodyForce for a force inside"
         )
     vectors, top = np.zeros_like(body.x), np.full(len(body.x), -1)
+    if body.exact:
+        own = skin[chosen[skin]]
+        vectors[own], top[own] = body.s[own], own
+        return vectors, top
     faces, pool = [], skin[chosen[skin]]
     while len(pool):
         n = _commonest(body, pool, skin)
@@ -77,7 +81,7 @@ def _commonest(body: Surface, pool: np.ndarray, skin: np.ndarray) -> np.ndarray 
 
 def _flat_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Face | None:
     tops = outermost(body, n)
-    if not chosen[tops].any() or not (body.exact or roughness_of(body, tops, n, chosen) < ROUGH):
+    if not chosen[tops].any() or roughness_of(body, tops, n, chosen) >= ROUGH:
         return None
     return find_face(body, chosen, n, who)
 

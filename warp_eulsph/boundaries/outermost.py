@@ -56,7 +56,8 @@ def along_and_beside(body: Surface, a: np.ndarray, b: np.ndarray, n: np.ndarray)
 def surface_particles(body: Surface) -> np.ndarray:
     """Particles with none above them along their own area vectors, sorted."""
     if b"" not in body.found:
-        skin = np.flatnonzero(np.linalg.norm(body.s, axis=1) > LARGE * body.size)
+        length = np.linalg.norm(body.s, axis=1)
+        skin = np.flatnonzero(length > (0.0 if body.exact else LARGE) * body.size)
         body.found[b""] = skin if body.exact else skin[~_blocked(body, skin, along(body, skin))]
     return body.found[b""]
 
@@ -65,8 +66,9 @@ def outermost(body: Surface, n: np.ndarray) -> np.ndarray:
     """Particles with none above them along ``n``, sorted."""
     key = n.tobytes()
     if key not in body.found:
-        facing = (np.linalg.norm(body.s, axis=1) > LARGE * body.size) & (body.s @ n > FACING * body.size)
-        tops = np.flatnonzero(facing)
+        large = np.linalg.norm(body.s, axis=1) > LARGE * body.size
+        facing = body.s @ n > FACING * body.size
+        tops = np.flatnonzero(facing if body.exact else facing & large)
         normals = np.broadcast_to(n, (len(tops), len(n)))
         body.found[key] = tops if body.exact else tops[~_blocked(body, tops, normals)]
     return body.found[key]
