@@ -14,11 +14,11 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "atomics", "simd", "order"},
-    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule"},
+    {"space", "linalg", "execution", "atomics", "simd", "order", "checks", "whole"},
+    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule", "overlap"},
     {"operators"},
     {"scheme", "contact"},
-    {"simulation", "transport", "diagnostics", "memory", "sorting", "output", "geometry"},
+    {"arguments", "simulation", "transport", "diagnostics", "memory", "sorting", "output", "geometry"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},
