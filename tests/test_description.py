@@ -2,6 +2,8 @@
 
 import functools
 import json
+import logging
+import threading
 
 import pytest
 from kept_runs import plate
@@ -83,6 +85,27 @@ def test_what_a_function_reads_of_its_module_is_part_of_the_case(monkeypatch):
     assert not differences(before, describe(simulation))
     monkeypatch.setitem(globals(), "SETTING", 2.0)
     assert differences(before, describe(simulation)) == ["boundaries.0.value.reads.SETTING: 1.0, now 2.0"]
+
+
+class Tangled:
+    """A load beside much that is none of its business, itself among it."""
+
+    def __init__(self, force):
+        self.force, self.missing, self.me = force, float("nan"), self
+        self.simulation, self.log, self.lock = plate(), logging.getLogger("tangled"), threading.Lock()
+
+    def load(self, x, t):
+        return self.force + 0.0 * x
+
+
+def test_what_is_described_is_the_same_each_time():
+    one, same, other = (describe_load(Tangled(force).load) for force in (1.0, 1.0, 2.0))
+    assert not differences(one, same) and not differences(one, json.loads(json.dumps(same)))
+    assert differences(one, other) == ["boundaries.0.value.of.force: 1.0, now 2.0"]
+
+
+def describe_load(load):
+    return describe(es.Simulation(plate().bodies[0], boundaries=[es.BodyForce(load)]))
 
 
 def test_functions_that_enclose_each_other_have_an_end():

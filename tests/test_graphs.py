@@ -204,7 +204,7 @@ def test_restored_simulations_go_on_by_graphs():
 def test_defaults_and_bad_settings():
     execution.set_graphs(None)
     assert execution.graphs("cpu", 100) and not execution.graphs("cpu", 100_000)
-    command = [sys.executable, "-c", "import warp_eulsph"]
+    command = [sys.executable, "-c", "from warp_eulsph import execution; execution.graphs('cpu', 1)"]
     run = subprocess.run(command, env={**os.environ, "WARP_EULSPH_GRAPHS": "yes"}, capture_output=True, text=True)
     assert run.returncode != 0
     assert "WARP_EULSPH_GRAPHS must be auto, 0 or 1, got 'yes'" in run.stderr

@@ -93,7 +93,12 @@ def graphs(device: Any, n: int) -> bool:
 
     By default on GPUs whose driver knows conditional graphs, and on the CPU where launches are too short for threads: a
     graph on the CPU runs on one.
+
+    Raises:
+        ValueError: the environment sets something that is none of its values.
     """
+    if _wrong is not None:
+        raise ValueError(_wrong)
     if _graphs is not None:
         return _graphs
     on_cpu = wp.get_device(device).is_cpu

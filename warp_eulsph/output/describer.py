@@ -4,6 +4,7 @@ import ast
 import functools
 import hashlib
 import inspect
+import sys
 import textwrap
 import types
 from collections.abc import Callable, Iterator, Mapping
@@ -28,6 +29,8 @@ class Describer:
 
     def plain(self, value: Any) -> Any:
         """``value`` in dictionaries, lists, strings and numbers."""
+        if isinstance(value, float) and value != value:
+            return "not a number"  # which would differ from itself
         if value is None or isinstance(value, bool | int | float | str):
             return value
         if id(value) in self._inside:
@@ -81,13 +84,14 @@ class Describer:
         return {**described, **({"call": self.plain(call)} if inspect.isfunction(call) else {})}
 
     def _function(self, function: Callable[..., Any]) -> Any:
-        code = function.__code__
-        described: dict[str, Any] = {"function": function.__qualname__, **_source(function)}
+        code, known = function.__code__, function.__globals__  # type: ignore[attr-defined]
+        described: dict[str, Any] = {"function": function.__qualname__}
+        if not _installed(known):  # of those that are, the environment of a run tells the version
+            described |= _source(function)
         described |= self._named("defaults", dict(enumerate(function.__defaults__ or ())))  # type: ignore[attr-defined]
         described |= self._named("keywords", function.__kwdefaults__ or {})  # type: ignore[attr-defined]
         cells = zip(code.co_freevars, function.__closure__ or (), strict=True)
         described["enclosed"] = {name: self.plain(_content(cell)) for name, cell in cells}
-        known = function.__globals__
         if not _installed(known):
             read = {name: known[name] for name in sorted(set(_names(code))) if name in known}
             read = {name: item for name, item in read.items() if _is_setting(item) and item is not function}
@@ -100,7 +104,10 @@ class Describer:
     def _object(self, value: Any) -> Any:
         """The type of any other object, and what it holds if it holds anything."""
         name = type(value).__name__
-        held = getattr(value, "__dict__", None)
+        module = type(value).__module__.partition(".")[0]
+        if module in ("warp", "warp_eulsph"):  # what simulations are made of tells of memory, not of what is meant
+            return name
+        held = None if module in sys.stdlib_module_names else getattr(value, "__dict__", None)
         if held:
             return {"type": name, **self.plain(held)}
         try:
@@ -121,9 +128,11 @@ def _is_setting(value: Any) -> bool:
 
 
 def _installed(known: Mapping[str, Any]) -> bool:
-    """Whether a module's names are those of a package, whose version the environment of a run tells."""
-    file = str(known.get("__file__") or "")
-    return "site-packages" in file or "dist-packages" in file or known.get("__name__", "").startswith("warp_eulsph.")
+    """Whether a module's names are those of an installed package or of Python itself."""
+    file, name = str(known.get("__file__") or ""), str(known.get("__name__") or "").partition(".")[0]
+    if name == "__main__":
+        return False
+    return "site-packages" in file or "dist-packages" in file or name in ("warp_eulsph", *sys.stdlib_module_names)
 
 
 def _names(code: types.CodeType) -> Iterator[str]:

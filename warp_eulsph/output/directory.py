@@ -168,6 +168,19 @@ class RunDirectory:
         files += [path for folder in self.tables for path in numbered(folder, ".h5")]
         return self.set_aside(path for path in files if int(path.stem) > step)
 
+    def set_aside_misfits(self) -> None:
+        """Set aside folders where a run has files, and files where it has folders: nothing could be written there.
+
+        Raises:
+            OSError: a move was refused; every file is in one of the two places.
+        """
+        folders = {"snap", "ckpt", "probes"}
+        there = [self.path / name for name in _TOP if os.path.lexists(self.path / name)]
+        wrong = [path for path in there if (path.is_dir() if path.name not in folders else not path.is_dir())]
+        for path in wrong:
+            log.warning("%s is not what a run has there, and is set aside", path)
+        self.set_aside(wrong)
+
     @property
     def tables(self) -> list[Path]:
         """Folders of the probes' tables."""
@@ -229,6 +242,8 @@ class RunDirectory:
 
     def _abandoned(self) -> Path:
         folder = self.path / "abandoned"
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise FileExistsError(f"{folder} is a file, where a run sets aside what it must not lose; move it away")
         taken = [int(path.name) for path in folder.iterdir() if _is_number(path.name)] if folder.is_dir() else []
         made = folder / f"{max(taken, default=0) + 1:04d}"
         os.makedirs(made)

@@ -153,6 +153,7 @@ def _go_on(
     """Put the simulation where the run was, and set aside what the run has of later steps."""
     _compare(checkpoint, simulation, description, force)
     simulation.restore(checkpoint.arrays, checkpoint.counters)
+    home.set_aside_misfits()
     home.rewind(checkpoint.step)
     for listing in (home.log, home.pieces):
         _cut(home, listing, checkpoint.step)

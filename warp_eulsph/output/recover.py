@@ -49,13 +49,12 @@ def recover(directory: str | PathLike) -> list[str]:
         with contextlib.suppress(DamagedError):
             manifest.read()
         gone = [f"{entry.name}: missing, no longer listed" for entry in manifest.entries if _is_gone(home, entry.name)]
-        if manifest.path.exists() and not manifest.path.is_file():
-            home.set_aside([manifest.path])
+        home.set_aside_misfits()
         damaged = manifest.rebuild()
         home.set_aside(home.path / name for name in damaged)
         writer = SnapshotWriter(home.path, resume=True)
         writer.derive()
-        if home.pieces.exists() and (not home.pieces.is_file() or read_lines(home.pieces).damaged):
+        if read_lines(home.pieces).damaged:
             home.set_aside([home.pieces])
         relist(home)
     return [*gone, *(f"{name}: not what was written, moved to abandoned" for name in damaged)]
