@@ -328,11 +328,8 @@ class Run(Sequence[RunFrame]):
 
     @property
     def title(self) -> str:
-        """Of the case that was run; empty if it has none."""
-        try:
-            return str(self.description.get("case", {}).get("title") or "")
-        except OSError:  # snapshots alone have no description
-            return ""
+        """Of the case file that was run; empty if there is none."""
+        return str(self.description.get("case", {}).get("settings", {}).get("title", ""))
 
     @property
     def environment(self) -> dict[str, Any]:
