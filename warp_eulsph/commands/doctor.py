@@ -18,7 +18,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "doctor",
         help="versions, devices, caches, and the speed of this machine",
-        description="Say which versions are installed, which devices there are and where compiled kernels are kept, and "
+        description="Say which versions are installed, which devices there are and where compiled kernels are kept; "
         "time a small block on each device, to be set beside docs/performance.md. Exit status: 0 all is there, 1 a "
         "package that is needed is not, or the block's energy is not accounted for.",
     )
