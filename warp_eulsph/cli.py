@@ -3,10 +3,10 @@
 import argparse
 from collections.abc import Sequence
 
-from .commands import bench, check, examples, export, info, plot, resume, run, schema, validate
+from .commands import bench, check, doctor, examples, export, info, plot, resume, run, schema, validate
 
 # Each imports what it needs when it runs, so that asking for help is quick.
-COMMANDS = (run, resume, info, check, plot, export, examples, schema, validate, bench)
+COMMANDS = (run, resume, info, check, plot, export, examples, schema, validate, bench, doctor)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -8,8 +8,9 @@ import xarray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from .derived import DERIVED
 from .fields import KNOWN
-from .reader import DERIVED, Run, RunFrame
+from .reader import Run, RunFrame
 
 AXES = "xyz"
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from .. import weights
+from .derived import DERIVED, Derived
 from .directory import RunDirectory, numbered
 from .log import read_log
 from .manifest import Entry, Manifest
@@ -18,21 +19,11 @@ from .sealed import DamagedError
 from .shape_functions import shape_functions
 from .snapshot import read_field, read_units
 from .tables import read_table
-from .tensors import padded
 
 if TYPE_CHECKING:
     import xarray
 
 log = logging.getLogger(__name__)
-
-#: Units of the fields that a frame derives from those it holds.
-DERIVED = {
-    "von_mises": "Pa",
-    "principal_stresses": "Pa",
-    "principal_stretches": "-",
-    "green_lagrange": "-",
-    "first_piola": "Pa",
-}
 
 #: What ``RunFrame.interpolate`` needs of the snapshots besides the field itself.
 INTERPOLATION = ("volume", "smoothing_length", "body")
@@ -57,7 +48,7 @@ class Smoothing:
     box: tuple[float, ...] = ()
 
 
-class RunFrame:
+class RunFrame(Derived):
     """One snapshot; fields are read when they are asked for, and kept.
 
     Attributes:
@@ -116,35 +107,6 @@ class RunFrame:
     def pressure(self) -> np.ndarray:
         """Minus a third of the trace of the stress [Pa], (N,)."""
         return self["pressure"] if "pressure" in self.units else -np.trace(self.cauchy_stress.T) / 3.0
-
-    @property
-    def von_mises(self) -> np.ndarray:
-        """Von Mises stress √(3/2 s:s) of the stress deviator s [Pa], (N,)."""
-        sigma = self.cauchy_stress.astype(float)
-        deviator = sigma - np.trace(sigma.T)[:, None, None] / 3.0 * np.eye(3)
-        return np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator))
-
-    @property
-    def principal_stresses(self) -> np.ndarray:
-        """Eigenvalues of the Cauchy stress [Pa], (N, 3), least first."""
-        return np.linalg.eigvalsh(self.cauchy_stress.astype(float))
-
-    @property
-    def principal_stretches(self) -> np.ndarray:
-        """Singular values of F [-], (N, dim), least first."""
-        return np.linalg.svd(self.F.astype(float), compute_uv=False)[:, ::-1]
-
-    @property
-    def green_lagrange(self) -> np.ndarray:
-        """Green-Lagrange strain ½ (FᵀF − I) [-], (N, dim, dim)."""
-        F = self.F.astype(float)
-        return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(F.shape[1]))
-
-    @property
-    def first_piola(self) -> np.ndarray:
-        """First Piola–Kirchhoff stresses J σ F⁻ᵀ, force per initial area [Pa], (N, 3, 3); missing stretches are 1."""
-        F = padded(self.F.astype(float), 1.0)
-        return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)
 
     @property
     def particles(self) -> np.ndarray:
@@ -340,11 +302,8 @@ class Run(Sequence[RunFrame]):
 
     @property
     def title(self) -> str:
-        """Of the case that was run; empty if it has none."""
-        try:
-            return str(self.description.get("case", {}).get("title") or "")
-        except OSError:  # snapshots alone have no description
-            return ""
+        """Of the case file that was run; empty if there is none."""
+        return str(self.description.get("case", {}).get("settings", {}).get("title", ""))
 
     @property
     def environment(self) -> dict[str, Any]:

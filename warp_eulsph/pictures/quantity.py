@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..output.reader import DERIVED, RunFrame
+from ..output.derived import DERIVED
+from ..output.reader import RunFrame
 
 AXES = "xyz"
 

@@ -1,0 +1,48 @@
+"""Fields that a frame derives from those it holds."""
+
+import numpy as np
+
+from .tensors import padded
+
+#: Units of the fields that a frame derives from those it holds.
+DERIVED = {
+    "von_mises": "Pa",
+    "principal_stresses": "Pa",
+    "principal_stretches": "-",
+    "green_lagrange": "-",
+    "first_piola": "Pa",
+}
+
+
+class Derived:
+    """Stresses and strains of a frame with ``cauchy_stress`` and ``F``."""
+
+    @property
+    def von_mises(self) -> np.ndarray:
+        """Von Mises stress √(3/2 s:s) of the stress deviator s [Pa], (N,)."""
+        sigma = self.cauchy_stress.astype(float)
+        deviator = sigma - np.trace(sigma.T)[:, None, None] / 3.0 * np.eye(3)
+        return np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator))
+
+    @property
+    def principal_stresses(self) -> np.ndarray:
+        """Eigenvalues of the Cauchy stress [Pa], (N, 3), least first."""
+        return np.linalg.eigvalsh(self.cauchy_stress.astype(float))
+
+    @property
+    def principal_stretches(self) -> np.ndarray:
+        """Singular values of F [-], (N, dim), least first."""
+        F: np.ndarray = self.F.astype(float)
+        return np.linalg.svd(F, compute_uv=False)[:, ::-1]
+
+    @property
+    def green_lagrange(self) -> np.ndarray:
+        """Green-Lagrange strain ½ (FᵀF − I) [-], (N, dim, dim)."""
+        F = self.F.astype(float)
+        return 0.5 * (F.transpose(0, 2, 1) @ F - np.eye(F.shape[1]))
+
+    @property
+    def first_piola(self) -> np.ndarray:
+        """First Piola–Kirchhoff stresses J σ F⁻ᵀ, force per initial area [Pa], (N, 3, 3); missing stretches are 1."""
+        F = padded(self.F.astype(float), 1.0)
+        return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)
