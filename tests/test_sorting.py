@@ -47,9 +47,8 @@ def two_blocks(dim=2, *, order=None, conditions=None, material=RUBBER, **options
     ]
     if conditions is None:
         conditions = [es.Fixed(lambda X: X[:, 0] < 0.2), es.Velocity(lambda X: X[:, 0] > 3.8, lambda x, t: 1e3 * t)]
-    return es.Simulation(
-        bodies, boundaries=conditions, **{"time_step": es.TimeStep(fixed=1e-4), "arrangement": es.Current(), **options}
-    )
+    options = {"time_step": es.TimeStep(fixed=1e-4), "arrangement": es.Current(), **options}
+    return es.Simulation(bodies, boundaries=conditions, **options)
 
 
 def shuffle(simulation, seed=0):
