@@ -166,6 +166,7 @@ CONDITIONS = {
     "BodyForce by present positions": es.BodyForce(lambda x, t: 1e5 * x[:, ::-1], TOP),
     "BodyForce by initial positions": es.BodyForce(lambda X, t: 1e5 * X[:, ::-1], TOP, material=True),
     "BodyForce by initial positions on the device": es.BodyForce(push, TOP, material=True),
+    "Gravity": es.Gravity(1e4, body="free"),
     "Pressure": es.Pressure(1e6, body="free"),
     "Traction": es.Traction(1e6 * each(len(TOP)), (0.0, 1.0), TOP),
     "Roller": es.Roller(LEFT, (1.0, 0.5)),
