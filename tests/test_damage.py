@@ -1,5 +1,6 @@
 """A run's directory damaged in every way: it is said, nothing whole is lost, and nothing is a traceback."""
 
+import json
 import os
 import random
 import shutil
@@ -46,6 +47,14 @@ def numbers_in(path):
     return [k for k, byte in enumerate(path.read_bytes()) if chr(byte).isdigit()]
 
 
+def values_of(content):
+    """What the bytes of a file of JSON, or of lines of it, say; None where they say nothing."""
+    try:
+        return [json.loads(text) for text in ([content] if content.count(b"\n{") == 0 else content.splitlines())]
+    except ValueError:
+        return None
+
+
 @pytest.mark.parametrize("name", [*JSON, *LINES])
 def test_no_changed_digit_goes_unseen(original, tmp_path, name):
     copy = shutil.copytree(original, tmp_path / "run")
@@ -55,6 +64,8 @@ def test_no_changed_digit_goes_unseen(original, tmp_path, name):
     for place in rng.sample(places, min(40, len(places))):
         changed = bytearray(content)
         changed[place] = ord(rng.choice([c for c in "0123456789" if ord(c) != content[place]]))
+        if values_of(changed) == values_of(content):
+            continue  # the last of seventeen digits, which tells no other number
         (copy / name).write_bytes(changed)
         assert check(copy).problems, f"{name}, byte {place}: {content[place - 20 : place + 20]}"
     (copy / name).write_bytes(content)

@@ -66,6 +66,13 @@ class Assembly:
         return chosen.astype(np.int32)
 
 
+def rows_of(indices: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Where ``numbers``, (k,), stand among ``indices``, which hold all of them in any order: (k,)."""
+    order = np.argsort(indices)
+    rows: np.ndarray = order[np.searchsorted(indices, numbers, sorter=order)]
+    return rows
+
+
 def read_only(values: np.ndarray) -> np.ndarray:
     """A copy for a user's function, which can change neither it nor what it was made of."""
     copy = np.array(values)

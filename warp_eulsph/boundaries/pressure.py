@@ -11,7 +11,7 @@ import warp as wp
 from ..fields import structure
 from ..linalg import cofactor
 from ..space import Space
-from .base import Assembly, Bound, Boundary, Region, unit_vector
+from .base import Assembly, Bound, Boundary, Region, rows_of, unit_vector
 from .face import faces_along, surfaces_held
 from .named_surface import find_surface
 from .value import Value
@@ -136,7 +136,7 @@ class BoundFacePressure(BoundPressure):
         shares = np.where(square > 0.0, (self.areas * s).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0)
         rests = self.areas - shares[:, None] * s
         self._places = assembly.order.places_of(self.members.astype(np.int32))
-        self._rows = wp.array(np.searchsorted(self.indices, tops), dtype=wp.int32, device=self.device)
+        self._rows = wp.array(rows_of(self.indices, tops), dtype=wp.int32, device=self.device)
         self._shares = wp.array(shares, dtype=self.space.real, device=self.device)
         self._rests = wp.array(rests, dtype=self.space.vec, device=self.device)
 

@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from ..space import Space
-from .base import Assembly, Bound, Boundary, Region, unit_vector
+from .base import Assembly, Bound, Boundary, Region, rows_of, unit_vector
 from .face import faces_along
 from .value import Value
 
@@ -84,7 +84,7 @@ class BoundTraction(Bound):
     def start(self, state: Any) -> None:
         face = faces_along(self.assembly, state, self.indices, self.condition.body, self.normal, "Traction")
         self.face, self._places = face, self.assembly.order.places_of(face.members)
-        rows = np.searchsorted(self.indices, face.tops[face.columns])
+        rows = rows_of(self.indices, face.tops[face.columns])
         self._rows = wp.array(rows, dtype=wp.int32, device=self.device)
         self._areas = wp.array(face.areas, dtype=self.space.real, device=self.device)
 
