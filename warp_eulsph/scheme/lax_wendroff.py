@@ -34,11 +34,11 @@ class LaxWendroff:
         smoothing: S of the half step; None is the identity, which never gained energy at CFL 0.4; NeighbourAverage()
             is the paper's. Neither it nor LinearExact() is safe in bounded bodies.
         dissipation: M9; None leaves zero-energy modes undamped.
-        correction: what makes a moving reference stable: Balance() (M13), SurfaceVectors() (M10) or PairAreas() (M11,
-            M12); None is the plain dual form, which pairs up in tension. Not used with a fixed reference, where it is
-            zero unless the bodies came with surface vectors.
+        correction: what makes arrangements stable that move with the reference: Balance() (M13), SurfaceVectors() (M10)
+            or PairAreas() (M11, M12); None is the plain dual form, which pairs up in tension. Not used where nothing
+            moves, where it is zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
-        shifting: what keeps the arrangement even in a moving reference (M15), with Balance() only; None shifts nothing.
+        shifting: what keeps moving arrangements even (M15), with Balance() only; None shifts nothing.
         tie: what ties positions to F where the arrangement does not move (M16); None is the paper's.
     """
 
