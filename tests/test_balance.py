@@ -1,6 +1,7 @@
 """Balanced pair vectors (M13), the smoothing length that follows the volume, and the step that both allow (M14)."""
 
 import contextlib
+import logging
 
 import numpy as np
 import pytest
@@ -193,6 +194,24 @@ def test_a_body_pulled_apart_has_free_faces(speed):
     faces = simulation.stepper.U.surface.numpy()[inner, 0]
     assert faces.mean() > 0.5 * 0.05  # outward, of the order of a particle's face
     assert speed > 60.0 or faces.min() > 0.5 * 0.05
+
+
+def test_a_tear_is_an_event(caplog):
+    """A solid pulled apart with its neighbours read anew: a warning, once, or an end; never of a convected one."""
+    from warp_eulsph.validation.cases import extension
+
+    with caplog.at_level(logging.WARNING, logger="warp_eulsph.failure"):
+        simulation, _ = extension.build(2, 10, es.Always(), 0.1, rate=4.0, arrangement=es.Current())
+        simulation.run(0.25)
+    assert caplog.text.count("a solid comes apart without a law of failure") == 1
+    assert "of body 'body' at x =" in caplog.text and simulation.tear is not None
+    assert 0.0 < simulation.tear.time < 0.25
+    simulation, _ = extension.build(2, 10, es.Always(), 0.1, rate=4.0, arrangement=es.Current(stop_when_torn=True))
+    with pytest.raises(es.UnstableError, match=r"arrangement=Convected\(\) holds solids together"):
+        simulation.run(0.25)
+    simulation, _ = extension.build(2, 10, es.Always(), 0.1, rate=4.0)
+    simulation.run(0.25)
+    assert simulation.tear is None
 
 
 @pytest.mark.parametrize("strain", [0.1, -0.3], ids=["tension", "compression"])

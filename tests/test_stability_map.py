@@ -204,3 +204,11 @@ def test_the_defaults_hold_in_a_bounded_cube():
     point = Point(dim=3, across=4, periodic=False)
     assert spectral_radius(point) <= 1.0 + RESOLVED
     assert spectral_radius(replace(point, jitter=0.2)) <= 1.0 + RESOLVED
+
+
+@pytest.mark.parametrize(("dim", "across"), [(2, 8), (3, 6)])
+@pytest.mark.parametrize("stretch", [1.5, 2.0, 5.0])
+def test_lattices_pulled_one_way_do_not_grow(dim, across, stretch):
+    """The default, about uniaxial stress: any wave, to a stretch of five."""
+    strain = (stretch - 1.0, *[stretch**-0.4 - 1.0] * (dim - 1))
+    assert spectral_radius(Point(dim=dim, across=across, strain=strain)) <= 1.0 + RESOLVED

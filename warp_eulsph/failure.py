@@ -1,10 +1,13 @@
 """When a run has failed, and what the user is told: a bad particle, a step that vanished, energy that a step made."""
 
+import logging
 from typing import Any
 
 import numpy as np
 
-from .scheme.health import UnstableError, last_good
+from .scheme.health import WELL, UnstableError, last_good
+
+log = logging.getLogger(__name__)
 
 # A time step that fell below this share of the longest one means neighbourhoods that collapsed: the run would not end.
 STALLED = 1e-6
@@ -34,10 +37,45 @@ def failure(simulation: Any) -> UnstableError | None:
         what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
         remedy = f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
     else:
-        return None
+        return _look_for_tears(simulation)
     return UnstableError(
         f"unstable at t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
         f"{where(simulation, particle, simulation.x)} has {what}; {last_good(simulation.output)}; {remedy}",
+        particle,
+        simulation.t,
+        simulation.steps,
+    )
+
+
+def _look_for_tears(simulation: Any) -> UnstableError | None:
+    """Note the first tear of a solid and log it, once; it is a failure where the arrangement says so."""
+    if simulation.tear is None:
+        simulation.tear = _tear(simulation)
+        if simulation.tear is not None and getattr(simulation.arrangement, "stop_when_torn", False):
+            return simulation.tear  # type: ignore[no-any-return]
+        if simulation.tear is not None:
+            log.warning("%s", simulation.tear)
+    return None
+
+
+def _tear(simulation: Any) -> UnstableError | None:
+    """The first time that a solid came apart; reads the device.
+
+    What flows opens and closes all the time; only a body whose law carries its whole F is meant to hold together.
+    """
+    torn = getattr(simulation.stepper.stabiliser, "torn", None)
+    place = WELL if torn is None else int(torn.numpy()[0])
+    if place == WELL:
+        return None
+    particle = int(simulation.order.ids.numpy()[place])
+    body = next(body for body in simulation.bodies if particle in simulation.ranges[body.name])
+    if body.material.flows:
+        return None
+    lost = -simulation.stepper.ledger.accounts()["dissipation"]
+    return UnstableError(
+        f"a solid comes apart without a law of failure by t = {simulation.t:.8g} s, step {simulation.steps}: the first "
+        f"particle with a new face is {particle} {where(simulation, particle, simulation.x)}; dissipation has taken "
+        f"{lost:.4g} J so far; arrangement=Convected() holds solids together",
         particle,
         simulation.t,
         simulation.steps,

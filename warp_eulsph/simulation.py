@@ -22,6 +22,7 @@ from .schedule import AtTimes, EveryTime, targets
 from .scheme.arrangement import Arrangement, Convected
 from .scheme.flux import Flux, check_reference
 from .scheme.graphs import StepGraphs, recordable
+from .scheme.health import UnstableError
 from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff, is_corrected
 from .scheme.reference import Always, Configuration, Never, ReferencePolicy
@@ -133,6 +134,7 @@ class Simulation(Looks):
         self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self.whole = Whole()
+        self.tear: UnstableError | None = None  # the first time that a solid came apart without a law of failure
         self.watch: Bar | None = None  # shows how far a run is
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
 

@@ -33,8 +33,14 @@ class Current(Arrangement):
     """Every body is read anew at each refresh (Eulerian kernels): the paper's form.
 
     In elastic solids it relaxes stress as soon as particles leave their places, and tears in tension (docs/method.md,
-    §7); for comparisons, and for the paper's figures.
+    §7); for comparisons, and for the paper's figures. That a solid comes apart, which no law of failure asked for, is
+    logged as a warning, once.
+
+    Args:
+        stop_when_torn: raise UnstableError there instead.
     """
+
+    stop_when_torn: bool = False
 
     def moves(self, material: Material) -> bool:
         return True

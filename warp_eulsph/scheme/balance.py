@@ -7,12 +7,14 @@ from typing import Any
 
 import warp as wp
 
+from ..atomics import lower_to
 from ..fields import arrays, neighbour_structure, structure
 from ..linalg import det, inverse
 from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
 from .dissipation import UpwindForces
 from .flux import Flux
+from .health import WELL
 from .reference import Configuration, ReferencePolicy, reference_spacing
 
 # Eigenvalue of the saw-tooth, the wave that pairs particles up, of the graph Laplacian over its diagonal, by dimension,
@@ -85,18 +87,29 @@ class Balance:
 
 @functools.cache
 def _make_renew(space: Space) -> Any:
-    """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13)."""
+    """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13).
+
+    ``torn`` takes the place of the first particle with a new face.
+    """
     real, vec = space.real, space.vec
     Reference, dim = structure(space, "Reference"), space.dim
-    most = OPENED**dim
+    most, lower = OPENED**dim, lower_to
 
     @wp.kernel(module="unique", enable_backward=False)
-    def renew(first: int, reference: Reference, defect: wp.array(dtype=vec), surface: wp.array(dtype=vec)):
+    def renew(
+        first: int,
+        reference: Reference,
+        defect: wp.array(dtype=vec),
+        surface: wp.array(dtype=vec),
+        torn: wp.array(dtype=wp.int32),
+    ):
         a = first + wp.tid()
         opening = wp.length(defect[a])  # |d|ᵈ/Vᵈ⁻¹, the d-th power of |d| over the face: no root to take
         for _ in range(wp.static(dim - 1)):
             opening *= wp.length(defect[a]) / reference.V[a]
         if opening > real(most):
+            if wp.length(surface[a] + defect[a]) > wp.length(surface[a]):
+                lower(torn, a)
             surface[a] = surface[a] + defect[a]
             defect[a] = vec()
 
@@ -230,6 +243,7 @@ class BalancedPairs(UpwindForces):
         self._balanced, self._moving = [range(n)], moving  # all at the start, then those that move
         # A push goes on until the next refresh looks at it again: the longer a reference lasts, the less it may push.
         self.lean = option.lean / math.sqrt(policy.lasts)
+        self.torn = wp.full(1, WELL, dtype=wp.int32, device=device)
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
 
     def evolving(self) -> dict[str, wp.array]:
@@ -243,7 +257,7 @@ class BalancedPairs(UpwindForces):
         """Balance the new reference."""
         reference, near, simd = configuration.fields, configuration.near, configuration.simd
         configuration.defect(state.surface, self.defect)
-        self._over(_make_renew(self.space), [reference, self.defect, state.surface])
+        self._over(_make_renew(self.space), [reference, self.defect, state.surface, self.torn])
         for sweep in range(self.option.sweeps):
             old, new = self.psi, self._other
             if (self.option.sweeps - sweep) % 2:  # the last sweep writes ψ, the others take turns
