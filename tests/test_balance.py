@@ -10,7 +10,6 @@ import warp as wp
 import warp_eulsph as es
 from warp_eulsph.geometry import box
 from warp_eulsph.validation.cases import bending_column, piston, punch
-from warp_eulsph.validation.stability_step import Point, Step
 
 RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 COUNT = {1: 24, 2: 9, 3: 6}
@@ -214,58 +213,41 @@ def test_a_tear_is_an_event(caplog):
     assert simulation.tear is None
 
 
-@pytest.mark.parametrize("strain", [0.1, -0.3], ids=["tension", "compression"])
-def test_what_has_been_moved_comes_back(strain):
-    """A strained lattice with a small load on each particle: the lean holds it, without it particles pair up."""
-    nearest = {}
-    for lean in (0.0, 1.0):
-        scheme = es.Verlet(correction=es.Balance(lean=lean))
-        step = Step(Point(dim=2, across=8, strain=strain, reference=es.Always(), scheme=scheme))
-        load = np.zeros((64, step.columns))
-        load[:, -2:] = 1e-3 * np.random.default_rng(0).standard_normal((64, 2))  # surface vectors
-        step.start(load)
-        for _ in range(1800):
-            step.take()
-        nearest[lean] = step.simulation.stepper.configuration.nearest().min()
-    assert nearest[0.0] < 0.3
-    assert nearest[1.0] > 0.6
+ARRANGEMENTS = [es.Convected(), es.Current()]
 
 
 def test_particles_at_a_clamp_keep_apart():
-    """A bending column: what pairs up above its held layer takes 3 % of the energy by 0.6 s without the lean."""
+    """A bending column: what pairs up above its held layer, read anew, takes 3 % of the energy by 0.6 s."""
     kept = {}
-    for lean in (0.0, 1.0):
-        simulation = bending_column.build(
-            2, 20, es.Always(), arrangement=es.Current(), scheme=es.Verlet(correction=es.Balance(lean=lean))
-        )
+    for arrangement in ARRANGEMENTS:
+        simulation = bending_column.build(2, 20, es.Always(), arrangement=arrangement)
         start = simulation.energy()["total"]
         simulation.run(0.6)
-        kept[lean] = simulation.energy()["total"] / start
-    assert kept[0.0] < 0.98
-    assert kept[1.0] > 0.996  # total Lagrangian: 0.998
-    assert simulation.stepper.configuration.nearest().min() * 20 > 0.45
+        kept[arrangement] = simulation.energy()["total"] / start
+    assert kept[es.Convected()] > 0.996
+    assert 0.95 < kept[es.Current()] < 0.98
 
 
 def test_material_flows_round_an_edge():
-    """Under a punch, 10 % deep; a lean along compression on waves of all lengths takes 3.7 % of its reaction."""
-    reactions = []
-    for reference in (es.Never(), es.Always()):
-        simulation, condition = punch.build(40, reference)
-        reactions.append(punch.near(punch.measure(simulation, condition, until=0.0103), "reaction", 0.01))
-    assert reactions[1] > 0.97 * reactions[0]
+    """Under a punch, 10 % deep: within 5 % of the reference's reaction; read anew, a tenth and more below it."""
+    for arrangement, low in zip(ARRANGEMENTS, (0.95, 0.85), strict=True):
+        simulation, condition = punch.build(40, es.Always(), arrangement=arrangement)
+        reaction = punch.near(punch.measure(simulation, condition, until=0.0103), "reaction", 0.01)
+        assert low < reaction / (0.5 * sum(punch.REACTIONS[0.01])) < 1.05
 
 
-def test_strong_shocks_hold():
-    """Behind a fast piston; a lean beyond M5 alone along compression loses a quarter of the stress there."""
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS, ids=repr)
+def test_strong_shocks_hold(arrangement):
+    """Behind a fast piston."""
     driven = piston.PISTONS["compression_100"]
-    simulation = piston.build(400, driven, es.Always())
+    simulation = piston.build(400, driven, es.Always(), arrangement=arrangement)
     found = piston.errors(simulation, piston.measure(simulation, driven), driven)
     assert max(abs(error) for error in found.values()) < 0.02
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"sweeps": 0}, "sweeps"), ({"bound": 0.0}, "bound"), ({"bound": 0.4}, "bound"), ({"lean": -1.0}, "lean")],
+    [({"sweeps": 0}, "sweeps"), ({"bound": 0.0}, "bound"), ({"bound": 0.4}, "bound")],
 )
 def test_bad_options_are_named(options, message):
     with pytest.raises(ValueError, match=message):

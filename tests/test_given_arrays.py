@@ -37,6 +37,7 @@ def test_rows_of_values_belong_to_the_indices_in_their_order(numbers):
     assert np.array_equal(simulation.v[numbers], rows)
 
 
+FACE = np.flatnonzero(X[:, 0] == X[:, 0].max()).tolist()
 CONDITIONS = {
     "BodyForce": lambda numbers, rows: es.BodyForce(1e3 * rows, region=numbers),
     "Traction": lambda numbers, rows: es.Traction(1e6 * rows, normal=(1.0, 0.0), region=numbers),
@@ -50,6 +51,8 @@ CONDITIONS = {
 @settings(max_examples=4, deadline=None)
 @given(regions, st.randoms(use_true_random=False))
 def test_the_order_of_a_region_changes_nothing(condition, numbers, random):
+    if condition is CONDITIONS["Traction"]:  # a face is named by its outermost particles
+        numbers = list(dict.fromkeys(FACE[i % len(FACE)] for i in numbers))
     rows = np.array([[i + 1.0, 0.5 * i] for i in numbers])
     shuffled = list(range(len(numbers)))
     random.shuffle(shuffled)

@@ -68,7 +68,7 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
 
     def powers(stepper, kappa):
         stabiliser = es.PairAreas(kappa=kappa).build(
-            stepper.space, stepper.particles, stepper.flux, stepper.policy, stepper.flux.bodies, stepper.device
+            stepper.space, stepper.particles, stepper.flux, stepper.flux.bodies, stepper.device
         )
         assert stabiliser.takes_dual(stepper.configuration, sensed=False)
         stepper.flux.keep_dual()

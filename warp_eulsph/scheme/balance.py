@@ -8,39 +8,18 @@ from typing import Any
 import warp as wp
 
 from ..atomics import lower_to
-from ..fields import arrays, neighbour_structure, structure
+from ..fields import neighbour_structure, structure
 from ..linalg import det, inverse
 from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
 from .dissipation import UpwindForces
 from .flux import Flux
 from .health import WELL
-from .reference import Configuration, ReferencePolicy, reference_spacing
-
-# Eigenvalue of the saw-tooth, the wave that pairs particles up, of the graph Laplacian over its diagonal, by dimension,
-# in lattices at dilation 1.3.
-SAW_TOOTH = {1: 1.85, 2: 1.35, 3: 1.05}
+from .reference import Configuration, reference_spacing
 
 # Share of the residual that a sweep corrects, by dimension: these take the saw-tooth down fastest without overshooting;
 # what is corrected too far repels in tension, pairs in compression.
 RELAXATION = {1: 0.52, 2: 0.75, 3: 0.85}
-
-# Disorder |½ψ|, over the spacing, at which half of the lean is taken: little of it in lattices, nearly all of it where
-# particles have begun to rearrange. At first order in the disorder there is none.
-LEANING = 0.01
-
-# Stress over the modulus of pressure waves at which half of the lean is taken: waves of small strain, which rearrange
-# nothing, run as in the balanced arrangement.
-LOADED = 0.01
-
-# T of the lean along a single tension and a single compression. In tension less loses the sheared block earlier; in
-# compression −1 is M5 alone, and beyond it strong shocks are lost; weaker ones still let particles at clamps pair up.
-ALONG_TENSION, ALONG_COMPRESSION = 1.5, -0.9
-
-# Waves whose eigenvalue is less than this part of the saw-tooth's lean less along compression: pairs are short waves,
-# while long ones are what material that flows round an edge carries along. At a half strong shocks are off by 1.3 %
-# instead of 1.0; at a quarter the punch's reaction is 3.4 % too low instead of 2.1.
-SHORT = 1.0 / 3.0
 
 # A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
 OPENED = 1.0
@@ -55,34 +34,23 @@ class Balance:
     which are the ones that pair particles up. Where e_a − s_a exceeds the particle's own face, the body has opened
     or closed: s_a becomes e_a, a free surface or none.
 
-    What is closed exactly does not return either: particles that something has moved, stay. So in a disordered
-    arrangement under stress it is corrected too far along tension, and its short waves hardly at all along compression:
-    either pushes back.
-
     Args:
         sweeps: relaxation sweeps per refresh, from ψ = 0.
         bound: largest |x̂ − x| over the particle's spacing in the reference.
-        lean: largest share λ of that in a reference that lasts one step, less by √k in one that lasts k; 0 closes
-            alike in all directions.
     """
 
     sweeps: int = 5
     bound: float = 0.25
-    lean: float = 1.0
 
     def __post_init__(self) -> None:
         if self.sweeps < 1:
             raise ValueError(f"sweeps must be at least 1, got {self.sweeps}; correction=None balances nothing")
         if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
             raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.25 is the tested value")
-        if not (math.isfinite(self.lean) and 0.0 <= self.lean <= 1.0):
-            raise ValueError(f"lean must be in [0, 1], got {self.lean}; 1 is the tested value")
 
-    def build(
-        self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, moving: list[range], device: Any
-    ) -> "BalancedPairs":
+    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "BalancedPairs":
         """Allocate."""
-        return BalancedPairs(self, space, particles, flux, policy, moving, device)
+        return BalancedPairs(self, space, particles, moving, device)
 
 
 @functools.cache
@@ -153,51 +121,21 @@ def _make_relax(space: Space, simd: bool, start: bool) -> Any:
 
 @functools.cache
 def _make_shift(space: Space) -> Any:
-    """Kernel: x̂ = x − ½(ψ + λ(T₊ψ + T₋χ)), λ = lean m²/(m² + LEANING²) q²/(q² + LOADED²) (M13).
-
-    m = |½ψ| and the bound are in spacings, q is |Q| over the modulus of pressure waves; T± = ½t±(Q̂² ± Q̂), Q̂ = Q/|Q|,
-    are t± along a single tension and a single compression; χ, not longer than ψ, is ψ of short waves.
-    """
-    real, vec, mat = space.real, space.vec, space.mat
-    short_wave = 0.5 / (SHORT * SAW_TOOTH[space.dim])
-    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
-    spacing_of = reference_spacing(space)
-
-    @wp.func
-    def within(v: vec, most: real) -> vec:
-        if wp.length(v) > most:
-            v = v * (most / wp.length(v))
-        return v
+    """Kernel: x̂ = x − ½ψ, not further away than ``bound`` spacings (M13)."""
+    real, vec = space.real, space.vec
+    Particles, Reference, spacing_of = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        reference_spacing(space),
+    )
 
     @wp.kernel(module="unique", enable_backward=False)
-    def shift(
-        first: int,
-        particles: Particles,
-        reference: Reference,
-        K: wp.array(dtype=mat),
-        defect: wp.array(dtype=vec),
-        psi: wp.array(dtype=vec),
-        flux: Flux,
-        bound: real,
-        lean: real,
-    ):
+    def shift(first: int, particles: Particles, reference: Reference, psi: wp.array(dtype=vec), bound: real):
         a = first + wp.tid()
-        spacing = spacing_of(a, particles, reference)
-        away = psi[a] * real(0.5)
-        disorder = wp.dot(away, away) / (spacing * spacing)
-        share = lean * disorder / (disorder + real(LEANING * LEANING))
-        Q, modulus = flux.Q[a], flux.impedance[a] * flux.speed[a] * real(LOADED)
-        load = wp.ddot(Q, Q)
-        if load > real(0.0) and disorder > real(0.0):
-            share *= load / (load + modulus * modulus)
-            short = K[a] @ defect[a] * (real(short_wave) / (reference.V[a] * reference.diagonal[a]))
-            short = within(short, wp.length(away))
-            Q_hat = Q / wp.sqrt(load)
-            pulled, pressed = Q_hat @ away, Q_hat @ short
-            tension = (Q_hat @ pulled + pulled) * real(0.5 * ALONG_TENSION)
-            compression = (Q_hat @ pressed - pressed) * real(0.5 * ALONG_COMPRESSION)
-            away += (tension + compression) * share
-        reference.balanced[a] = reference.x[a] - within(away, bound * spacing)
+        away, most = psi[a] * real(0.5), bound * spacing_of(a, particles, reference)
+        if wp.length(away) > most:
+            away = away * (most / wp.length(away))
+        reference.balanced[a] = reference.x[a] - away
 
     return shift
 
@@ -227,31 +165,16 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    def __init__(
-        self,
-        option: Balance,
-        space: Space,
-        particles: Any,
-        flux: Flux,
-        policy: ReferencePolicy,
-        moving: list[range],
-        device: Any,
-    ):
+    def __init__(self, option: Balance, space: Space, particles: Any, moving: list[range], device: Any):
         super().__init__(space, device)
-        self.flux = flux.fields  # of the last step when a refresh asks for it
         self.option, self.particles, n = option, particles, len(particles.mass)
         self._balanced, self._moving = [range(n)], moving  # all at the start, then those that move
-        # A push goes on until the next refresh looks at it again: the longer a reference lasts, the less it may push.
-        self.lean = option.lean / math.sqrt(policy.lasts)
         self.torn = wp.full(1, WELL, dtype=wp.int32, device=device)
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
 
     def evolving(self) -> dict[str, wp.array]:
-        """The potentials that shifting (M15) follows before the next refresh, and what that one leans on."""
-        flux = arrays(self.flux, "Flux")
-        return {"BalancedPairs.psi": self.psi} | {
-            name: flux[name] for name in ("Flux.Q", "Flux.impedance", "Flux.speed")
-        }
+        """The potentials that shifting (M15) follows before the next refresh."""
+        return {"BalancedPairs.psi": self.psi}
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Balance the new reference."""
@@ -264,8 +187,7 @@ class BalancedPairs(UpwindForces):
                 old, new = new, old
             arguments = [reference, near, configuration.K, self.defect, old, new]
             self._over(_make_relax(self.space, simd, sweep == 0), arguments)
-        arguments = [self.particles, reference, configuration.K, self.defect, self.psi, self.flux]
-        self._over(_make_shift(self.space), [*arguments, self.option.bound, self.lean])
+        self._over(_make_shift(self.space), [self.particles, reference, self.psi, self.option.bound])
         self._over(_make_correct(self.space, simd), [reference, near, configuration.K, configuration.poor])
         self._balanced = self._moving
 

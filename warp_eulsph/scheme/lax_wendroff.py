@@ -120,7 +120,7 @@ class LaxWendroffStepper:
                     f"correction must be Balance() or None where some bodies move and others do not, got "
                     f"{options.correction}; arrangement=Current() moves all"
                 )
-            self.stabiliser = options.correction.build(space, particles, flux, policy, moving_bodies, device)
+            self.stabiliser = options.correction.build(space, particles, flux, moving_bodies, device)
         self.tie: TiedPairs | None = None
         if options.tie is not None:
             self.tie = options.tie.build(space, flux, moving, device)

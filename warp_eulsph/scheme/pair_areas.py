@@ -13,7 +13,7 @@ from ..reduce import Sum
 from ..space import Space, difference
 from .dissipation import UpwindForces, blend, upwind
 from .flux import Flux
-from .reference import Configuration, ReferencePolicy
+from .reference import Configuration
 from .stabiliser import Stabiliser
 
 
@@ -41,9 +41,7 @@ class PairAreas:
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(
-        self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, moving: list[range], device: Any
-    ) -> "ClosedPairs":
+    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "ClosedPairs":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return ClosedPairs(self, space, particles, flux.bodies, device)
 

@@ -1,7 +1,6 @@
 """The reference configuration k, and the one knob: when it is refreshed."""
 
 import functools
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,11 +35,6 @@ class ReferencePolicy(ABC):
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
         """Whether to refresh before step number ``step`` (0 is the first; the reference is fresh then)."""
 
-    @property
-    def lasts(self) -> float:
-        """Steps that a reference lasts, as far as that is known before."""
-        return math.inf
-
 
 @dataclass(frozen=True)
 class Never(ReferencePolicy):
@@ -70,10 +64,6 @@ class Every(ReferencePolicy):
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
         return step % self.steps == 0
 
-    @property
-    def lasts(self) -> float:
-        return float(self.steps)
-
 
 @dataclass(frozen=True)
 class Always(ReferencePolicy):
@@ -83,10 +73,6 @@ class Always(ReferencePolicy):
 
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
         return True
-
-    @property
-    def lasts(self) -> float:
-        return 1.0
 
 
 @dataclass(frozen=True)
@@ -104,10 +90,6 @@ class WhenDistorted(ReferencePolicy):
 
     def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
         return configuration.distortion(F) > self.ratio
-
-    @property
-    def lasts(self) -> float:
-        return 30.0  # some tens of steps in the problems of docs/distortion.md; nobody knows before
 
 
 # The smoothing length follows the volume between these, so that one particle cannot make the lists endless.

@@ -10,7 +10,7 @@ from ..space import Space
 from .dissipation import UpwindForces
 from .flux import Flux
 from .projection import Projection
-from .reference import Configuration, ReferencePolicy
+from .reference import Configuration
 from .stabiliser import Stabiliser
 
 
@@ -25,9 +25,7 @@ class SurfaceVectors:
 
     project: bool = False
 
-    def build(
-        self, space: Space, particles: Any, flux: Flux, policy: ReferencePolicy, moving: list[range], device: Any
-    ) -> "SurfaceForces":
+    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "SurfaceForces":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return SurfaceForces(self, space, particles, flux.bodies, device)
 

@@ -22,7 +22,6 @@ import warp as wp
 
 from .. import (
     Always,
-    Balance,
     Current,
     Every,
     PairAreas,
@@ -53,7 +52,7 @@ REFERENCES: dict[str, tuple[ReferencePolicy, dict[str, Any]]] = {
     "current, criterion": (WhenDistorted(1.2), {"arrangement": Current()}),
     "current, shifted": (
         Always(),
-        {"arrangement": Current(), "scheme": Verlet(correction=Balance(lean=0.0), shifting=Shifting())},
+        {"arrangement": Current(), "scheme": Verlet(shifting=Shifting())},
     ),
     "current, M11": (
         Always(),

@@ -140,7 +140,7 @@ def run(quick: bool) -> Sequence[Figure]:
             figures.append(Figure(f"{name}_{quantity}_error", error, -band, band, 0.0))
         apart = difference(current.x - simulation.bodies[0].x, simulation.x - simulation.bodies[0].x)
         residual = abs(simulation.energy()["residual"]) / history["work"][-1]
-        figures.append(Figure(f"{name}_current_arrangement_difference", apart, 0.0, 0.01, 0.0))
+        figures.append(Figure(f"{name}_current_arrangement_difference", apart, 0.0, band, 0.0))
         figures.append(Figure(f"{name}_ledger_residual", residual, 0.0, 1e-10, 0.0))
     return figures
 

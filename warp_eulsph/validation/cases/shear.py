@@ -16,7 +16,6 @@ import warp as wp
 
 from ... import (
     Always,
-    Balance,
     Body,
     Convected,
     Current,
@@ -81,7 +80,7 @@ def errors(simulation: Simulation, upper: Motion) -> dict[str, float]:
 #: Name -> arrangement, scheme and shear: the default, and two that read the current arrangement.
 FORMS = {
     "convected": (Convected(), Verlet(), 10.0),
-    "current_shifted": (Current(), Verlet(correction=Balance(lean=0.0), shifting=Shifting()), 5.0),
+    "current_shifted": (Current(), Verlet(shifting=Shifting()), 5.0),
     "current_m11": (Current(), Verlet(correction=PairAreas(kappa=math.inf)), 5.0),
 }
 
