@@ -61,7 +61,7 @@ def _make_renew(space: Space) -> Any:
     """
     real, vec = space.real, space.vec
     Reference, dim = structure(space, "Reference"), space.dim
-    most, lower = OPENED**dim, lower_to
+    most = OPENED**dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def renew(
@@ -77,7 +77,7 @@ def _make_renew(space: Space) -> Any:
             opening *= wp.length(defect[a]) / reference.V[a]
         if opening > real(most):
             if wp.length(surface[a] + defect[a]) > wp.length(surface[a]):
-                lower(torn, a)
+                lower_to(torn, a)
             surface[a] = surface[a] + defect[a]
             defect[a] = vec()
 
