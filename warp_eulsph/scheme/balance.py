@@ -123,11 +123,8 @@ def _make_relax(space: Space, simd: bool, start: bool) -> Any:
 def _make_shift(space: Space) -> Any:
     """Kernel: x̂ = x − ½ψ, not further away than ``bound`` spacings (M13)."""
     real, vec = space.real, space.vec
-    Particles, Reference, spacing_of = (
-        structure(space, "Particles"),
-        structure(space, "Reference"),
-        reference_spacing(space),
-    )
+    Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
+    spacing_of = reference_spacing(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(first: int, particles: Particles, reference: Reference, psi: wp.array(dtype=vec), bound: real):

@@ -116,11 +116,8 @@ def _make_dissipate(space: Space, sensed: bool) -> Any:
                 jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
             else:
                 jump = jump * epsilon
-            now, Z, Z_shear = (
-                separation(x[b], x[a], near.box),
-                Z_a + flux.impedance[b],
-                Z_shear_a + flux.shear_impedance[b],
-            )
+            now = separation(x[b], x[a], near.box)
+            Z, Z_shear = Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b]
             upwind_ab = pair_force(xi, now, VVg, Z, Z_shear, jump)
             dissipation += upwind_ab
             dissipated += wp.dot(upwind_ab, plain)
