@@ -61,6 +61,7 @@ class World:
         self.moves_surfaces = not all(medium.policy.fixed for medium in self.media) or any(
             condition.reads_surface for condition in self.conditions
         )
+        self.limiting = [condition for condition in self.conditions if condition.limits]
         self.half = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
         if not self.moves_surfaces:
             self.half.surface = self.U.surface
