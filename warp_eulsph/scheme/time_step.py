@@ -64,6 +64,7 @@ def _make_choose(space: Space) -> Any:
         elif dt > wp.float64(0.5) * left and fixed == wp.float64(0.0):
             dt = wp.float64(0.5) * left  # two even steps instead of a long and a tiny one
         clock.dt[0] = dt
+        clock.added[0] = wp.float64(0.0)  # asked for anew before the next step
 
     return choose
 
@@ -166,9 +167,8 @@ class DeviceClock:
         return int(self.fields.taken.numpy()[0])
 
     def ask(self) -> None:
-        """Forget what was asked for, to be asked anew: largest rates of waves into ``rate``, then others."""
+        """Begin to ask for the next step: of the waves by ``rate``, of others by ``frequency`` and ``add``."""
         self.fields.rate.zero_()
-        self.fields.added.zero_()
 
     def add(self) -> None:
         """Count the ``frequency`` that one condition asked for."""
