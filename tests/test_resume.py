@@ -123,7 +123,7 @@ def resume_is_exact(build, before, after):
     resumed.restore(stored.arrays, stored.counters)
     resumed.step(after)
     assert bits(resumed) == bits(whole)
-    lists = "simulation.stepper.configuration.lists"
+    lists = "simulation.stepper.media.0.configuration.lists"
     kept = numbers.keys() - {f"{lists}._builds", f"{lists}.cells._stride"}  # room in the lists, not what is in them
     assert all(reachable(resumed)[1][path] == reachable(whole)[1][path] for path in kept)
 

@@ -107,7 +107,7 @@ def test_uniform_stress_acts_on_the_surface_vectors_only():
         stepper.configuration.refresh(stepper.U)
         stepper.stabiliser.refresh(stepper.configuration, stepper.U)
         stepper._stress(stepper.U)
-        stepper._sum_forces(stepper.U, stepper.U.v, 0.0)
+        stepper._sum_forces(stepper.U, stepper.U, 0.0)
         total = stepper.forces.internal.numpy() + stepper.forces.correction.numpy()
         exact = -np.einsum("aij,aj->ai", stepper.flux.fields.Q.numpy(), stepper.U.surface.numpy())
         errors[correction] = np.abs(total - exact).max() / np.abs(exact).max()
