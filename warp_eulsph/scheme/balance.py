@@ -18,8 +18,9 @@ from .health import WELL
 from .reference import Configuration, reference_spacing
 from .stabiliser import Correction
 
-# Share of the residual that a sweep corrects, by dimension: these take the saw-tooth down fastest without overshooting;
-# what is corrected too far repels in tension, pairs in compression.
+# Share of the residual that a sweep corrects, by dimension: the reciprocal of the largest eigenvalue on a lattice,
+# rounded down (at dilation 1.3, in 1-D at 1.2 too; `python -m warp_eulsph.validation.balance_sweeps`). What is
+# corrected too far repels in tension, pairs in compression.
 RELAXATION = {1: 0.52, 2: 0.75, 3: 0.85}
 
 # A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
