@@ -43,7 +43,8 @@ class Simulation(Looks):
     Args:
         bodies: one or several ``Body``; particles of different bodies are never neighbours.
         boundaries: conditions, imposed in this order.
-        reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian.
+        reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian. This,
+            arrangement, scheme, weight and dilation are those of bodies that have none of their own; the step is one.
         arrangement: which bodies a refresh reads anew from their positions: Convected() those that flow, Current() all.
         scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax.
         time_step: TimeStep options.
@@ -85,9 +86,9 @@ class Simulation(Looks):
         self.boundaries = tuple(objects(boundaries, Boundary, "boundaries", "Fixed(lambda X: X[:, 0] < 0.1)"))
         self.reference, self.arrangement, self.dilation = reference, arrangement, dilation
         box = checked_box(periodic, self.space.dim)
-        media = plan_media(self.bodies, Options(reference, arrangement, scheme, weight, dilation))
-        for each in media:
-            check_memory(self.space, each.n, each.reach, each.moves, self.device)
+        self.options = Options(reference, arrangement, scheme, weight, dilation)
+        media = plan_media(self.bodies, self.options)
+        check_memory(self.space, [(each.n, each.reach, each.moves) for each in media], self.device)
         self.ranges = ranges_of(self.bodies)
         self.particles = make_particles(self.space, media, self.device)
         self.order = Order(len(X), self.device)
@@ -261,8 +262,8 @@ class Simulation(Looks):
 
     @property
     def configuration(self) -> Configuration:
-        """The configuration in which weights live now."""
-        return self.stepper.configuration
+        """The configuration in which weights live now, of the first medium; ``stepper.media`` has all."""
+        return self.stepper.media[0].configuration
 
     @property
     def x(self) -> np.ndarray:
@@ -288,12 +289,12 @@ class Simulation(Looks):
         """Least and largest volume ratio det F [-], largest speed [m/s] and largest mismatch [spacings]."""
         U = self.stepper.U
         found = dict(zip(("least J", "largest J", "speed"), self.diagnostics.extrema(U), strict=True))
-        return found | {"mismatch": self.diagnostics.mismatch(self.configuration, U)[1]}
+        return found | {"mismatch": self.diagnostics.mismatch(self.stepper.media, U)[1]}
 
     @property
     def mismatch(self) -> np.ndarray:
         """How far positions and F disagree around each particle [spacings], rms of r_ab of its pairs (M16), (n,)."""
-        return self.order.by_number(self.diagnostics.mismatch(self.configuration, self.stepper.U)[0].numpy())
+        return self.order.by_number(self.diagnostics.mismatch(self.stepper.media, self.stepper.U)[0].numpy())
 
     def energy(self) -> dict[str, float]:
         """Energies [J]: kinetic, stored in strain, in the tie (M16), total, what each mechanism added, the residual."""

@@ -37,6 +37,7 @@ class StepGraphs:
             stepper.step()
             self._taken.add(due)
             return
+        self._forget_old_lists()
         clock.open_batch()
         launched, batch = 0, []
         while due in self._taken:
@@ -53,11 +54,13 @@ class StepGraphs:
             stepper.advance()
             stepper.steps += 1
 
-    def _graph(self, due: tuple[int, ...]) -> Any:
+    def _forget_old_lists(self) -> None:
         lists = [medium.configuration.near.index for medium in self.stepper.media]
         if len(lists) != len(self._lists) or any(a is not b for a, b in zip(lists, self._lists, strict=True)):
             self._graphs.clear()
             self._lists = lists
+
+    def _graph(self, due: tuple[int, ...]) -> Any:
         if due not in self._graphs:
             with wp.ScopedCapture(self.stepper.device) as capture:
                 self._record(due)

@@ -107,17 +107,22 @@ class Medium:
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
 
-    def join(self, states: Sequence[Any], forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
-        """See the own particles of the world's ``states``, of ``forces`` and of ∇v, by its ``clock``."""
-        self._views = [(state, part(self.space, state, "State", self.span)) for state in states]
+    def join(self, U: Any, half: Any, forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
+        """See the own particles of the world's two states, of ``forces`` and of ∇v, by its ``clock``."""
+        self._whole, self._own = U, part(self.space, U, "State", self.span)
+        self._own_half = part(self.space, half, "State", self.span)
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
 
     def of(self, state: Any) -> Any:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
-        return next(view for whole, view in self._views if whole is state)
+        return self._own if state is self._whole else self._own_half
 
     # the reference
+
+    def due(self, step: int, state: Any) -> bool:
+        """Whether the reference is to be refreshed before step number ``step``."""
+        return not self.policy.fixed and self.policy.due(step, self.configuration, self.of(state).F)
 
     def start(self, state: Any) -> None:
         """Make ``state`` the first reference."""

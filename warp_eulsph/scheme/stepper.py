@@ -42,9 +42,12 @@ class Stepper(World, ABC):
             medium.gradients(state)
 
     def _choose_dt(self, state: Any) -> None:
-        self.clock.fields.rate.zero_()
+        self.clock.ask()
         for medium in self.media:
             medium.wave_speeds(state)
+        for condition in self.limiting:
+            condition.limit(state, self.clock.fields)
+            self.clock.add()
         self.clock.choose()
 
     def _sense(self, state: Any) -> None:

@@ -61,13 +61,14 @@ class World:
         self.moves_surfaces = not all(medium.policy.fixed for medium in self.media) or any(
             condition.reads_surface for condition in self.conditions
         )
+        self.limiting = [condition for condition in self.conditions if condition.limits]
         self.half = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
         if not self.moves_surfaces:
             self.half.surface = self.U.surface
         self.forces = self._allocate_forces()
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         for medium in self.media:
-            medium.join([self.U, self.half], self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
+            medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
         self._start([each.surface_given for each in parts.media])
         self.ledger = Ledger(space, self.particles, self.media, self.clock, device)
         self.ledger.open(self.U)
@@ -103,8 +104,9 @@ class World:
 
     def due(self, step: int) -> tuple[int, ...]:
         """Which media's references are to be refreshed before step number ``step``; the first finds them fresh."""
-        media = enumerate(self.media) if step > 0 else ()
-        return tuple(k for k, m in media if m.policy.due(step, m.configuration, m.of(self.U).F))
+        if step == 0:
+            return ()
+        return tuple([k for k, medium in enumerate(self.media) if medium.due(step, self.U)])
 
     def refresh(self, due: Sequence[int], by: Refresh = BY_HOST) -> None:
         """Make U the reference of these media, shifted (M15)."""
