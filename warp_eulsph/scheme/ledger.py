@@ -20,14 +20,15 @@ _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> Any:
+def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
-    The tie's is the power of its force and of its stress, which Q holds and W does not (M16).
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
+    where it has a stress (M9).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -76,6 +77,11 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
                 tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
                 strain_power -= tied_power
                 tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
+            dissipation = wp.dot(precise(forces.dissipation[a]), v_mean)
+            if wp.static(dragged):
+                dragged_power = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
+                strain_power -= dragged_power
+                dissipation -= dragged_power
             stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
             limiter = wide(0.0)
             if wp.static(limited):
@@ -86,7 +92,7 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
             total += wide(particles.share[a]) * _Entry(
                 dt * wp.dot(precise(forces.external[a]), v_mean),
                 wp.dot(impulse, v_mean),
-                dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+                dt * dissipation,
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
                 tie,
                 limiter,
@@ -249,8 +255,9 @@ class Ledger:
                 dv = smoothed[k]
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
             arguments += [self.clock.fields, medium.forces]
-            tied = len(flux.fields.tie) > 0
-            self._book(page, _make_entries(self.space, tied, limiter is not None, smoothed is not None), arguments)
+            tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
+            kernel = _make_entries(self.space, tied, dragged, limiter is not None, smoothed is not None)
+            self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
