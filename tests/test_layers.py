@@ -17,7 +17,7 @@ LAYERS = [
     {"space", "linalg", "execution", "atomics", "simd", "order", "checks", "notices", "whole"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
     {"operators"},
-    {"scheme", "contact"},
+    {"scheme", "interactions"},
     {"body", "overlap"},
     {"simulation", "looks", "progress", "transport", "diagnostics", "memory", "sorting", "output", "geometry"}
     | {"arguments", "failure", "building"},

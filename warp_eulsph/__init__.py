@@ -26,6 +26,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
+from .interactions import Interaction
 from .materials import (
     Bar,
     LinearElastic,
@@ -84,6 +85,7 @@ __all__ = [
     "Fixed",
     "FluxCorrectedTransport",
     "Gravity",
+    "Interaction",
     "Lax",
     "LaxWendroff",
     "Linear",

@@ -48,7 +48,13 @@ def _transport(transport: Transport) -> dict[str, Any]:
 def _solids(simulation: Simulation) -> dict[str, Any]:
     stepper = simulation.stepper
     conditions = zip(simulation.boundaries, simulation.conditions, strict=True)
+    exchanges = zip(simulation.interactions, simulation.bound_interactions, strict=True)
+    interactions = {
+        str(i): {**plain(interaction), "particles": plain(bound.indices)}
+        for i, (interaction, bound) in enumerate(exchanges)
+    }
     return {
+        **({"interactions": interactions} if interactions else {}),
         "scheme": plain(stepper.options),
         "reference": plain(simulation.reference),
         "arrangement": plain(simulation.arrangement),

@@ -16,7 +16,7 @@ from .stepper import Stepper
 
 def recordable(stepper: Stepper) -> bool:
     """Whether steps launch kernels only: conditions given as Python functions need the host in every step."""
-    return all(condition.recordable for condition in stepper.conditions)
+    return all(part.recordable for part in (*stepper.conditions, *stepper.interactions))
 
 
 class StepGraphs:
@@ -51,7 +51,7 @@ class StepGraphs:
         stepper.steps += taken
         if taken < launched and any(medium.configuration.lists.waiting for medium in stepper.media):
             stepper.finish_refresh(batch[taken])
-            stepper.advance()
+            stepper.move_on()
             stepper.steps += 1
 
     def _forget_old_lists(self) -> None:
@@ -71,4 +71,4 @@ class StepGraphs:
         stepper, running = self.stepper, self.stepper.clock.fields.running
         if due:
             stepper.refresh(due, ByGraph(running))
-        wp.capture_if(running, stepper.advance)
+        wp.capture_if(running, stepper.move_on)
