@@ -146,8 +146,8 @@ def _make_shift_entry(space: Space) -> Any:
 @functools.cache
 def _make_subtract() -> Any:
     @wp.kernel(module="unique", enable_backward=False)
-    def subtract(value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def subtract(first: int, value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         out[a] = value[a] - out[a]
 
     return subtract
@@ -159,8 +159,8 @@ def _make_kinetic(space: Space) -> Any:
     precise = wp.types.vector(length=space.dim, dtype=wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def kinetic(particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def kinetic(first: int, particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         v_a = precise(v[a])
         out[a] = wp.float64(0.5) * wp.float64(particles.share[a] * particles.mass[a]) * wp.dot(v_a, v_a)
 
@@ -173,8 +173,8 @@ def _make_own(space: Space) -> Any:
     Particles = structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def own(particles: Particles, value: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def own(first: int, particles: Particles, value: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         value[a] = value[a] * wp.float64(particles.share[a])
 
     return own
@@ -251,7 +251,7 @@ class Ledger:
         """Note what limiters did to the stored energies."""
         for page in self._limited():
             page.medium.flux.energy(page.medium.of(U).F, page.W)
-            wp.launch(_make_subtract(), len(page.W), [page.W, page.dW_limited], device=self.device)
+            self._launch(_make_subtract(), len(page.W), [page.W, page.dW_limited])
 
     def _limited(self) -> list[_Page]:
         return [page for page in self._pages if page.medium.limiter is not None]
@@ -291,7 +291,7 @@ class Ledger:
 
     def kinetic(self, U: Any) -> float:
         """Kinetic energy [J]; reads the device."""
-        wp.launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W], device=self.device)
+        self._launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
@@ -307,7 +307,7 @@ class Ledger:
     def stored(self, U: Any) -> float:
         """Stored energy [J]; reads the device."""
         self._store(U)
-        wp.launch(_make_own(self.space), len(self._W), [self.particles, self._W], device=self.device)
+        self._launch(_make_own(self.space), len(self._W), [self.particles, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 

@@ -1,4 +1,4 @@
-"""What acts between pairs that keep their labels: the tie (M16) and dissipation (M9), forces and stresses in one pass."""
+"""What acts between pairs that keep their labels: the tie (M16) and dissipation (M9), forces and stresses in a pass."""
 
 import functools
 from typing import Any

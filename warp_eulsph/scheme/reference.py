@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..execution import Launcher, simd
+from ..atomics import raise_to
+from ..execution import Launcher, launch, simd
 from ..fields import allocate, arrays, neighbour_structure, structure
 from ..linalg import det, inverse, largest_shortening, stretch_bounds, stretch_of_volume, symmetric_bounds
 from ..operators.correction import make_correct, make_pair_sums, make_pair_sums_simd
@@ -100,12 +101,13 @@ def _make_distortion(space: Space) -> Any:
     real, mat = space.real, space.mat
     Reference = structure(space, "Reference")
     invert, bounds, shortening_of = inverse(space), stretch_bounds(space), largest_shortening(space)
+    raise_largest = raise_to(real)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def distortion(F: wp.array(dtype=mat), reference: Reference, largest: wp.array(dtype=real)):
-        a = wp.tid()
+    def distortion(first: int, F: wp.array(dtype=mat), reference: Reference, largest: wp.array(dtype=real)):
+        a = first + wp.tid()
         G = F[a] @ invert(reference.F[a])
-        wp.atomic_max(largest, 0, wp.sqrt(wp.max(bounds(G)[1], shortening_of(G))))
+        raise_largest(largest, wp.sqrt(wp.max(bounds(G)[1], shortening_of(G))))
 
     return distortion
 
@@ -116,8 +118,8 @@ def _make_nearest(space: Space) -> Any:
     Reference, Neighbours, separation = structure(space, "Reference"), neighbour_structure(space), difference(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def find_nearest(reference: Reference, near: Neighbours, nearest: wp.array(dtype=real)):
-        a = wp.tid()
+    def find_nearest(first: int, reference: Reference, near: Neighbours, nearest: wp.array(dtype=real)):
+        a = first + wp.tid()
         least = real(wp.inf)
         for k in range(near.start[a], near.start[a + 1]):
             least = wp.min(least, wp.length(separation(reference.x[near.index[k]], reference.x[a], near.box)))
@@ -294,11 +296,11 @@ class Configuration:
     def nearest(self) -> np.ndarray:
         """Distance of each particle to its nearest neighbour [m], (n,), inf without one; reads the device."""
         nearest = wp.zeros(len(self.poor), dtype=self.space.real, device=self.device)
-        wp.launch(_make_nearest(self.space), len(nearest), [self.fields, self.near, nearest], device=self.device)
+        launch(_make_nearest(self.space), len(nearest), [self.fields, self.near, nearest], self.device)
         return nearest.numpy()
 
     def distortion(self, F: wp.array) -> float:
         """Largest stretch or shortening of any particle since the last refresh; reads the device."""
         self._largest.zero_()
-        wp.launch(_make_distortion(self.space), len(F), [F, self.fields, self._largest], device=self.device)
+        self._launch(_make_distortion(self.space), len(F), [F, self.fields, self._largest])
         return float(self._largest.numpy()[0])

@@ -18,8 +18,8 @@ class Tilt:
     """Pair weights of M3 and M4 times t_ab = exp(−μ_a·ξ/dx), their adjoint in M5 (M17): right answers when coarse.
 
     At a free face all neighbours lie on one side, and the corrected gradient reads tangential derivatives a fraction of
-    a spacing inside: coarse bodies are soft in shear. μ_a takes as much of the third moment Σ_b w_ab t_ab |ξ|² ξ out of the
-    weights as |μ_a| ≤ ``most`` lets it; all of it but in the outermost layer. Inside even arrangements it is zero.
+    a spacing inside: coarse bodies are soft in shear. μ_a takes as much of the third moment Σ_b w_ab t_ab |ξ|² ξ out of
+    the weights as |μ_a| ≤ ``most`` lets it; all of it but in the outermost layer. Inside even arrangements it is zero.
 
     It acts where the arrangement does not move, at the price of one more number per pair.
 
@@ -77,8 +77,8 @@ def _within(space: Space) -> Any:
 def make_tilt(space: Space) -> Any:
     """Kernel: μ_a/dx [1/m], which minimises Φ(μ) = Σ_b w_ab |ξ|² exp(−μ·ξ/dx), convex, within |μ| ≤ ``most``.
 
-    The slope of Φ is the third moment Σ_b w_ab t_ab |ξ|² ξ of the tilted weights. By Newton's method on ln Φ. Zero where
-    the moment of the weights themselves is round-off, and where the neighbourhood lacks a direction.
+    The slope of Φ is the third moment Σ_b w_ab t_ab |ξ|² ξ of the tilted weights. By Newton's method on ln Φ. Zero
+    where the moment of the weights themselves is round-off, and where the neighbourhood lacks a direction.
     """
     real, vec, mat = space.real, space.vec, space.mat
     Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
