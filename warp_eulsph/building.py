@@ -77,6 +77,7 @@ class MediumPlan:
             device,
             moving=[body for body, moves in zip(flux.bodies, moving, strict=True) if moves],
             corrected=is_corrected(scheme, policy, given),
+            tilt=scheme.tilt,
         )
         return MediumParts(scheme, policy, self.span, own, flux, configuration, moving, given)
 
@@ -99,7 +100,7 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
                 "the simulation"
             )
         together, span = [body], ranges[body.name]
-        if media and media[-1].options == options:
+        if media and media[-1].options == options and media[-1].moves == MediumPlan([body], options, span).moves:
             before = media.pop()
             together, span = [*before.bodies, body], range(before.span.start, span.stop)
         media.append(MediumPlan(together, options, span))

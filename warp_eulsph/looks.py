@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .summary import Rows, as_html, as_text, extent
+from .turns import in_turn
 
 if TYPE_CHECKING:
     from .order import Order
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 ALL_FORCES = ("internal", "correction", "tie", "dissipation", "external", "reaction")
 
 
+@in_turn()
 class Looks:
     """Fields of a ``Simulation`` in the order of the bodies' particles, copies on the host, and how it is shown."""
 

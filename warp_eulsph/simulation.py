@@ -31,6 +31,7 @@ from .scheme.verlet import Verlet
 from .scheme.world import Parts
 from .sorting import Sorting
 from .space import Space
+from .turns import in_turn
 from .weights import CubicSpline, Weight
 from .whole import Whole
 
@@ -38,6 +39,7 @@ from .whole import Whole
 STEPS_BETWEEN_LOOKS = 8
 
 
+@in_turn("run", "frames", "step", "advance")
 class Simulation(Looks):
     """Runs bodies under conditions with one scheme.
 

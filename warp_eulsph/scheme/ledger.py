@@ -21,14 +21,15 @@ _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> Any:
+def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
-    The tie's is the power of its force and of its stress, which Q holds and W does not (M16).
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
+    where it has a stress (M9).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -77,6 +78,11 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
                 tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
                 strain_power -= tied_power
                 tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
+            dissipation = wp.dot(precise(forces.dissipation[a]), v_mean)
+            if wp.static(dragged):
+                dragged_power = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
+                strain_power -= dragged_power
+                dissipation -= dragged_power
             stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
             limiter = wide(0.0)
             if wp.static(limited):
@@ -87,7 +93,7 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
             total += wide(particles.share[a]) * _Entry(
                 dt * wp.dot(precise(forces.external[a]), v_mean),
                 wp.dot(impulse, v_mean),
-                dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+                dt * dissipation,
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
                 tie,
                 limiter,
@@ -140,8 +146,8 @@ def _make_shift_entry(space: Space) -> Any:
 @functools.cache
 def _make_subtract() -> Any:
     @wp.kernel(module="unique", enable_backward=False)
-    def subtract(value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def subtract(first: int, value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         out[a] = value[a] - out[a]
 
     return subtract
@@ -153,8 +159,8 @@ def _make_kinetic(space: Space) -> Any:
     precise = wp.types.vector(length=space.dim, dtype=wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def kinetic(particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def kinetic(first: int, particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         v_a = precise(v[a])
         out[a] = wp.float64(0.5) * wp.float64(particles.share[a] * particles.mass[a]) * wp.dot(v_a, v_a)
 
@@ -167,8 +173,8 @@ def _make_own(space: Space) -> Any:
     Particles = structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def own(particles: Particles, value: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def own(first: int, particles: Particles, value: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         value[a] = value[a] * wp.float64(particles.share[a])
 
     return own
@@ -245,7 +251,7 @@ class Ledger:
         """Note what limiters did to the stored energies."""
         for page in self._limited():
             page.medium.flux.energy(page.medium.of(U).F, page.W)
-            wp.launch(_make_subtract(), len(page.W), [page.W, page.dW_limited], device=self.device)
+            self._launch(_make_subtract(), len(page.W), [page.W, page.dW_limited])
 
     def _limited(self) -> list[_Page]:
         return [page for page in self._pages if page.medium.limiter is not None]
@@ -267,8 +273,9 @@ class Ledger:
                 dv = smoothed[k]
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
             arguments += [self.clock.fields, medium.forces]
-            tied = len(flux.fields.tie) > 0
-            self._book(page, _make_entries(self.space, tied, limiter is not None, smoothed is not None), arguments)
+            tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
+            kernel = _make_entries(self.space, tied, dragged, limiter is not None, smoothed is not None)
+            self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
@@ -284,7 +291,7 @@ class Ledger:
 
     def kinetic(self, U: Any) -> float:
         """Kinetic energy [J]; reads the device."""
-        wp.launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W], device=self.device)
+        self._launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
@@ -300,7 +307,7 @@ class Ledger:
     def stored(self, U: Any) -> float:
         """Stored energy [J]; reads the device."""
         self._store(U)
-        wp.launch(_make_own(self.space), len(self._W), [self.particles, self._W], device=self.device)
+        self._launch(_make_own(self.space), len(self._W), [self.particles, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 

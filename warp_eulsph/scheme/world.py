@@ -20,7 +20,6 @@ from .medium import Medium, MediumParts
 from .reference import Configuration
 from .refresh import BY_HOST, Refresh
 from .stabiliser import Stabiliser
-from .tie import TiedPairs
 from .time_step import DeviceClock
 
 
@@ -87,7 +86,7 @@ class World:
         self.loaded = bool(self.interactions) or any(condition.loads for condition in self.conditions)
         there = {
             "correction": any(medium.stabiliser.corrects for medium in self.media),
-            "tie": any(medium.tie is not None for medium in self.media),
+            "tie": any(medium.pairs is not None for medium in self.media),
             "external": self.loaded,
         }
         forces = allocate(self.space, "Forces", n, device, empty=there)
@@ -200,11 +199,6 @@ class World:
     def stabiliser(self) -> Stabiliser:
         """What keeps the sums of the only medium stable."""
         return self.medium.stabiliser
-
-    @property
-    def tie(self) -> TiedPairs | None:
-        """What ties positions to F in the only medium."""
-        return self.medium.tie
 
     # lines of a step
 
