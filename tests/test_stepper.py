@@ -66,9 +66,7 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
     """M12 with κ = 1: at every state correction + dissipation take energy; with κ = ∞ the correction feeds it."""
 
     def powers(stepper, kappa):
-        stabiliser = es.PairAreas(kappa=kappa).build(
-            stepper.space, stepper.particles, stepper.flux, stepper.flux.bodies, stepper.device
-        )
+        stabiliser = es.PairAreas(kappa=kappa).build(stepper.space, stepper.particles, stepper.flux, stepper.device)
         assert stabiliser.takes_dual(stepper.configuration, sensed=False)
         stepper.flux.keep_dual()
         stabiliser.refresh(stepper.configuration, stepper.U)
