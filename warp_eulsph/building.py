@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .body import Body
+from .body import Body, groups_of
 from .failure import place_of
 from .fields import allocate, part
 from .scheme.arrangement import Arrangement
@@ -73,7 +73,7 @@ class MediumPlan:
             corrected=is_corrected(scheme, policy, given),
             tilt=scheme.tilt,
         )
-        return MediumParts(scheme, policy, self.span, own, flux, configuration, given)
+        return MediumParts(scheme, policy, self.span, own, flux, configuration, given, groups_of(self.bodies))
 
 
 def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
@@ -100,6 +100,13 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
             before = media.pop()
             together, span = [*before.bodies, body], range(before.span.start, span.stop)
         media.append(MediumPlan(together, options, span))
+    for medium in media:
+        for body in medium.bodies:
+            if body.bonded not in (None, *(other.name for other in medium.bodies)):
+                raise ValueError(
+                    f"bodies {body.bonded!r} and {body.name!r} are bonded and must be of one medium; give them the "
+                    "same options, and no body with others between them"
+                )
     return media
 
 
@@ -129,6 +136,7 @@ def make_particles(space: Space, media: Sequence[MediumPlan], device: Any) -> An
     particles.spacing.assign(spacing)
     particles.share.fill_(1.0)
     particles.body.assign(np.repeat(np.arange(len(counts)), counts))
+    particles.group.assign(np.repeat(groups_of(bodies), counts))
     return particles
 
 

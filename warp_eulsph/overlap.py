@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .body import Body
+from .body import Body, groups_of
 
 # Faces that touch have their particles a spacing apart, and √1.5 of it where lattices are shifted against each other.
 TOUCHING = 1.25
@@ -24,13 +24,17 @@ def overlaps(bodies: Sequence[Body], ghosts: Sequence[np.ndarray], box: Sequence
     matter = [(body.x[~ghost], body.spacing[~ghost]) for body, ghost in zip(bodies, ghosts, strict=True)]
     shifts = np.array(list(itertools.product(*[(-length, 0.0, length) if length > 0.0 else (0.0,) for length in box])))
     lines = []
+    groups = groups_of(bodies)
     for (i, one), (j, other) in itertools.combinations(enumerate(matter), 2):
+        if groups[i] == groups[j]:
+            continue
         within = [_near(*one, *other, shifts), _near(*other, *one, -shifts)]
         if any(near.any() for near in within):
             names = [f"{near.sum()} particles of {bodies[k].name!r}" for k, near in zip((i, j), within, strict=True)]
             lines.append(
                 f"bodies {bodies[i].name!r} and {bodies[j].name!r} overlap or touch: {' and '.join(names)} lie within "
-                f"{TOUCHING} spacings of one of the other; bodies do not feel each other, they pass through"
+                f"{TOUCHING} spacings of one of the other; bodies do not feel each other, they pass through, unless "
+                "bonded=... makes them one or an interaction acts between them"
             )
     return lines
 

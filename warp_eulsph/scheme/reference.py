@@ -179,7 +179,7 @@ class Configuration:
         if self.plain:
             self.fields.balanced = self.fields.x
         tilted = self.tilt is not None
-        self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device, tilted)
+        self.lists = NeighbourLists(space, weight, self.fields.h, particles.group, box, device, tilted)
         self.K = self.fields.L if self.plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)

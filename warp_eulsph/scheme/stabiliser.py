@@ -13,6 +13,8 @@ from .reference import Configuration
 class Correction(ABC):
     """What makes arrangements stable that move with the reference: options; ``build`` makes the part that acts."""
 
+    #: It closes sums body by body, and so cannot do with bodies that are bonded to each other.
+    per_body: ClassVar[bool] = False
     #: Its stabiliser has potentials ``psi``, (n,) of vec, that shifting (M15) follows.
     has_potentials: ClassVar[bool] = False
 
