@@ -16,9 +16,10 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
     {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole"},
-    {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule", "summary", "overlap"},
+    {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
     {"operators"},
-    {"scheme", "contact"},
+    {"scheme", "interactions"},
+    {"body", "overlap"},
     {"simulation", "looks", "progress", "transport", "diagnostics", "memory", "sorting", "output", "geometry"}
     | {"arguments", "failure", "building"},
     {"validation", "pictures", "bench"},

@@ -26,6 +26,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
+from .interactions import Interaction
 from .materials import (
     Bar,
     LinearElastic,
@@ -56,6 +57,7 @@ from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.stabiliser import Correction
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.tie import Tie
+from .scheme.tilt import Tilt
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
 from .simulation import Body, Simulation
@@ -83,6 +85,7 @@ __all__ = [
     "Fixed",
     "FluxCorrectedTransport",
     "Gravity",
+    "Interaction",
     "Lax",
     "LaxWendroff",
     "Linear",
@@ -116,6 +119,7 @@ __all__ = [
     "SurfaceVectors",
     "TaitLiquid",
     "Tie",
+    "Tilt",
     "TimeStep",
     "Traction",
     "UnstableError",

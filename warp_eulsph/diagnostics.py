@@ -1,6 +1,7 @@
 """Momenta, extrema and sums over parts of a state, reduced on the device in float64."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,10 +9,10 @@ import warp as wp
 
 from .atomics import raise_to
 from .execution import Launcher, launch
-from .fields import neighbour_structure, structure
+from .fields import neighbour_structure, part_of, structure
 from .linalg import det, inverse
 from .reduce import Sum, SumOfParticles
-from .scheme.reference import Configuration
+from .scheme.medium import Medium
 from .space import Space, difference
 
 _Vec6 = wp.types.vector(length=6, dtype=wp.float64)
@@ -218,14 +219,16 @@ class Diagnostics:
         self._mismatch = wp.zeros(0, dtype=space.real, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
 
-    def mismatch(self, configuration: Configuration, state: Any) -> tuple[wp.array, float]:
+    def mismatch(self, media: Sequence[Medium], state: Any) -> tuple[wp.array, float]:
         """How far positions and F disagree around each particle, in spacings, (n,) on the device, and the largest."""
         if len(self._mismatch) == 0:
             self._mismatch = wp.zeros(len(state.x), dtype=self.space.real, device=self.device)
         self._largest.zero_()
-        arguments = [self.particles, configuration.fields, configuration.near, state, self._mismatch, self._largest]
-        kernel = _make_mismatch(self.space, configuration.fixed)
-        self._launch(kernel, len(state.x), arguments)
+        for medium in media:
+            configuration, out = medium.configuration, part_of(self._mismatch, medium.span)
+            arguments = [medium.particles, configuration.fields, configuration.near, medium.of(state), out]
+            kernel = _make_mismatch(self.space, configuration.fixed)
+            self._launch(kernel, medium.n, [*arguments, self._largest])
         return self._mismatch, float(self._largest.numpy()[0])
 
     def momenta(self, state: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,7 @@ class Looks:
 
     bodies: list[Any]
     boundaries: tuple[Any, ...]
+    interactions: tuple[Any, ...]
     space: "Space"
     order: "Order"
     device: Any
@@ -83,6 +84,7 @@ class Looks:
         return f"Simulation: {particles}, {dim}-D, {self.space.real.__name__} on {self.device}", [
             ("bodies", names),
             ("conditions", conditions),
+            ("interactions", ", ".join(type(each).__name__ for each in self.interactions) or "none"),
             ("time", f"{self.t:.6g} s, step {self.steps}, last one {self.dt:.4g} s"),
             ("extent", extent(self.x)),
             ("volume ratio", f"{extrema['least J']:.4g} … {extrema['largest J']:.4g}"),

@@ -99,9 +99,9 @@ class Sorting:
     def __init__(self, stepper: Stepper, order: Order, on: bool):
         self.stepper, self.order = stepper, order
         self.space, self.device = stepper.space, stepper.device
-        self.on = on and all(condition.sortable for condition in stepper.conditions)
+        self.on = on and all(part.sortable for part in (*stepper.conditions, *stepper.interactions))
         if on and not self.on:
-            log.info("particles are not sorted in memory: a condition does not say that it is sortable")
+            log.info("particles are not sorted in memory: a condition or interaction does not say that it is sortable")
         self._counts = [_CountParted(medium) for medium in stepper.media]
         self._in_order = SHORT_ROWS
         if self.on:
@@ -166,7 +166,8 @@ class Sorting:
     def _arrays(self) -> Iterator[tuple[wp.array, range]]:
         """What evolves and has an element for each particle, and the particles that each array is of."""
         stepper = self.stepper
-        own = {id(array) for condition in stepper.conditions for array in condition.evolving().values()}
+        parts = (*stepper.conditions, *stepper.interactions)
+        own = {id(array) for part in parts for array in part.evolving().values()}
         spans: dict[int, range] = {}
         for medium in stepper.media:
             first = medium.span.start
@@ -175,5 +176,5 @@ class Sorting:
                 spans[id(history)] = range(first + body.start, first + body.stop)
         for array in stepper.evolving().values():
             span = spans.get(id(array), range(stepper.n))
-            if len(array) == len(span) and id(array) not in own:  # those of conditions go by number
+            if len(array) == len(span) and id(array) not in own:  # theirs go by number
                 yield array, span

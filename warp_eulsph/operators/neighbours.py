@@ -161,11 +161,14 @@ class NeighbourLists:
         body: body numbers, (n,).
         box: lengths of the periodic box [m], zero where open.
         device: Warp device.
+        tilted: whether the weights of a pair's two ends differ (M17).
     """
 
-    def __init__(self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any):
+    def __init__(
+        self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any, tilted: bool = False
+    ):
         self.space, self.device, self._launch = space, device, Launcher(device)
-        self.h, self.body, self.box = h, body, space.vec(*box)
+        self.h, self.body, self.box, self._tilted = h, body, space.vec(*box), tilted
         n = len(h)
         self.support, self._in_cells = weight.support, simd(device)
         self.cells: Cells | None = None
@@ -223,6 +226,7 @@ class NeighbourLists:
         self._launch.forget()
         self.rows.index = wp.zeros(pairs, dtype=wp.int32, device=self.device)
         self.rows.w = wp.zeros(pairs, dtype=self.space.real, device=self.device)
+        self.rows.own = wp.zeros_like(self.rows.w) if self._tilted else self.rows.w
 
     def build(self, x: wp.array) -> None:
         """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.w`` is left to be computed."""

@@ -201,7 +201,7 @@ class Flux:
             history = wp.zeros(count, dtype=space.row(law.history), device=device) if law.history else None
             self.parts.append(_Part(first, count, law, constants, history))
             first += count
-        self.fields = allocate(space, "Flux", first, device, empty=("Pi", "tie"))
+        self.fields = allocate(space, "Flux", first, device, empty=("Pi", "tie", "drag"))
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.histories = [part.history for part in self.parts]
 

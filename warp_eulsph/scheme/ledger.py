@@ -11,6 +11,7 @@ from ..execution import Launcher
 from ..fields import clock_structure, part_of, structure
 from ..reduce import Sum, SumOfParticles
 from ..space import Space, matrix_type, vector_type
+from .exchanges import Exchanges
 from .medium import Medium
 from .time_step import DeviceClock
 
@@ -20,14 +21,15 @@ _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> Any:
+def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
-    The tie's is the power of its force and of its stress, which Q holds and W does not (M16).
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
+    where it has a stress (M9).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -76,6 +78,11 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
                 tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
                 strain_power -= tied_power
                 tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
+            dissipation = wp.dot(precise(forces.dissipation[a]), v_mean)
+            if wp.static(dragged):
+                dragged_power = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
+                strain_power -= dragged_power
+                dissipation -= dragged_power
             stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
             limiter = wide(0.0)
             if wp.static(limited):
@@ -86,7 +93,7 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
             total += wide(particles.share[a]) * _Entry(
                 dt * wp.dot(precise(forces.external[a]), v_mean),
                 wp.dot(impulse, v_mean),
-                dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+                dt * dissipation,
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
                 tie,
                 limiter,
@@ -193,9 +200,20 @@ class _Page:
 
 
 class Ledger:
-    """Energy accounts on the device, booked every step in float64 and read when asked."""
+    """Energy accounts on the device, booked every step in float64 and read when asked.
 
-    def __init__(self, space: Space, particles: Any, media: Sequence[Medium], clock: DeviceClock, device: Any):
+    What interactions do has an account where there are any: their work on the bodies and what they hold themselves.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        particles: Any,
+        media: Sequence[Medium],
+        clock: DeviceClock,
+        device: Any,
+        exchanges: Exchanges | None = None,
+    ):
         n = len(particles.mass)
         self.space, self.particles, self.clock, self.device = space, particles, clock, device
         self._launch = Launcher(device)
@@ -207,6 +225,7 @@ class Ledger:
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self.start, self._most = 0.0, 0.0
+        self._exchanges = exchanges
 
     def open(self, U: Any) -> None:
         """Start the books at state ``U``."""
@@ -214,11 +233,14 @@ class Ledger:
         for page in self._pages:
             page.medium.flux.energy(page.medium.of(U).F, page.W_old)
         self._total.zero_()
-        self.start = self.kinetic(U) + self.stored(U)
+        if self._exchanges is not None:
+            self._exchanges.open()
+        self.start = self.kinetic(U) + self.stored(U) + self.held()
 
     def evolving(self) -> dict[str, wp.array]:
         """The accounts and the end of the last step booked, by name; with ``start`` what a checkpoint must hold."""
-        return {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+        held = {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+        return held if self._exchanges is None else held | self._exchanges.evolving()
 
     def open_limiter(self, U: Any) -> None:
         """Note the stored energies before limiters change ``U``."""
@@ -239,6 +261,8 @@ class Ledger:
 
         ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (particles of the medium,) of vec for each.
         """
+        if self._exchanges is not None:
+            self._exchanges.record(U, self._v_old, self._total, ACCOUNTS.index("external"))
         for k, page in enumerate(self._pages):
             medium, limiter = page.medium, page.medium.limiter
             flux = medium.flux
@@ -249,8 +273,9 @@ class Ledger:
                 dv = smoothed[k]
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
             arguments += [self.clock.fields, medium.forces]
-            tied = len(flux.fields.tie) > 0
-            self._book(page, _make_entries(self.space, tied, limiter is not None, smoothed is not None), arguments)
+            tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
+            kernel = _make_entries(self.space, tied, dragged, limiter is not None, smoothed is not None)
+            self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
@@ -286,9 +311,18 @@ class Ledger:
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
+    def held(self) -> float:
+        """Energy that interactions hold [J]; reads the device."""
+        return 0.0 if self._exchanges is None else self._exchanges.held()
+
+    def exchanged(self) -> list[float]:
+        """Energy that each interaction added since the start [J], with what it holds; reads the device."""
+        return [] if self._exchanges is None else self._exchanges.accounts()
+
     def accounts(self) -> dict[str, float]:
-        """Energy that each mechanism added since the start [J]; reads the device."""
-        return dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+        """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
+        found = dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+        return found | ({} if self._exchanges is None else {"interaction": sum(self.exchanged())})
 
     def made(self) -> float:
         """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""
@@ -299,4 +333,4 @@ class Ledger:
 
     def residual(self, U: Any) -> float:
         """Energy that no account explains [J]; round-off if the operators are duals of each other."""
-        return self.kinetic(U) + self.stored(U) - self.start - sum(self.accounts().values())
+        return self.kinetic(U) + self.stored(U) + self.held() - self.start - sum(self.accounts().values())
