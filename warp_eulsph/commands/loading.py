@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any
 
 from ..output import Recording
-from ..output.fields import Recorded
+from ..output.recorded import Recorded
 
 EXAMPLE = "example:"
 

@@ -7,7 +7,6 @@ from .reader import Comparison, Run, RunFrame, points_on_line
 from .record import ChangedCaseError, Outcome, record
 from .recording import Recording
 from .recover import Findings, check, recover
-from .report import Figure, table
 from .sealed import DamagedError
 from .series import SnapshotWriter
 from .snapshot import Snapshot, read_snapshot, write_snapshot
@@ -21,7 +20,6 @@ __all__ = [
     "ChangedCaseError",
     "Comparison",
     "DamagedError",
-    "Figure",
     "Findings",
     "Outcome",
     "PointProbe",
@@ -40,6 +38,5 @@ __all__ = [
     "read_snapshot",
     "record",
     "recover",
-    "table",
     "write_snapshot",
 ]

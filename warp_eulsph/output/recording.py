@@ -9,8 +9,9 @@ import numpy as np
 
 from ..boundaries import Assembly, Region
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
-from .fields import Recorded, known_fields
+from .fields import known_fields
 from .probes import Probe
+from .recorded import Recorded
 from .snapshot import checked_precision
 
 
