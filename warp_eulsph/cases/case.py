@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..materials import Material
-from ..output import FIELDS, Probe
+from ..output import DEFAULT_FIELDS, FIELDS, Probe
 from ..scheme.arrangement import Arrangement
 from ..scheme.lax import Lax
 from ..scheme.lax_wendroff import LaxWendroff
@@ -72,7 +72,10 @@ class SolidsOutput(OutputTable):
 
     held = FIELDS
 
-    fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
+    fields: list[str] | None = Field(
+        None,
+        description=f"fields of a snapshot, of {', '.join(FIELDS)}; by default {', '.join(DEFAULT_FIELDS)}",
+    )
     body: str | None = Field(None, description="body whose particles are in the snapshots, any by default")
 
 

@@ -33,7 +33,7 @@ class SnapshotWriter:
 
     Args:
         directory: of the run; made if absent.
-        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); all if None.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); those by default if None.
         dtype: ``np.float32`` or ``np.float64`` of the stored reals.
         particles: numbers of those that snapshots hold, (k,), written as the field ``particle`` too; all if None.
         resume: go on after the snapshots that are there.

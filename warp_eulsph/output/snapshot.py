@@ -92,7 +92,7 @@ class Frame:
 def collect(
     simulation: Recorded, names: Iterable[str] | None, particles: np.ndarray | None = None, copies: Copies | None = None
 ) -> Frame:
-    """What the fields of these ``names``, all if None, are made of in the present state, of all ``particles`` if None.
+    """What the fields of these ``names``, those by default if None, are made of in the present state, of all ``particles`` if None.
 
     ``copies`` makes the copies, which may be on their way then; without it all is there.
     """
@@ -130,7 +130,7 @@ def write_snapshot(
     Args:
         path: file to make or replace, by custom ``*.vtkhdf``.
         simulation: its state.
-        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); all if None. Positions are always there.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); those by default if None. Positions are always there.
         dtype: ``np.float32`` or ``np.float64`` for positions and real fields; time is float64 always.
 
     Raises:
