@@ -20,7 +20,7 @@ Recorded = Simulation | Transport
 class SnapshotField(NamedTuple):
     """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and how it is made of sources.
 
-    ``default`` says whether snapshots hold it unless fields are chosen; others follow from these, or are seldom asked for.
+    ``default`` says whether snapshots hold it unless fields are chosen.
     """
 
     shape: Callable[[int], tuple[int, ...]]

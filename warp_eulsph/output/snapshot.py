@@ -92,9 +92,12 @@ class Frame:
 def collect(
     simulation: Recorded, names: Iterable[str] | None, particles: np.ndarray | None = None, copies: Copies | None = None
 ) -> Frame:
-    """What the fields of these ``names``, those by default if None, are made of in the present state, of all ``particles`` if None.
+    """What the fields of these ``names`` are made of in the present state.
 
-    ``copies`` makes the copies, which may be on their way then; without it all is there.
+    Args:
+        names: of fields; those by default if None.
+        particles: numbers of those asked for, (k,); all if None.
+        copies: makes the copies, which may be on their way then; if None all is there.
     """
     simulation.whole.check()
     fields, places = chosen_fields(names, simulation), simulation.order.places

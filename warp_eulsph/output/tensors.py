@@ -13,7 +13,7 @@ def padded(tensors: np.ndarray, diagonal: float) -> np.ndarray:
 
 
 def first_piola(stress: np.ndarray, F: np.ndarray) -> np.ndarray:
-    """P = J σ F⁻ᵀ of Cauchy stresses σ [Pa], (n, 3, 3), and F, (n, dim, dim), whose missing stretches are 1: (n, 3, 3)."""
+    """P = J σ F⁻ᵀ [Pa] of Cauchy stresses σ, (n, 3, 3), and F, (n, dim, dim), missing stretches 1: (n, 3, 3)."""
     full = padded(F, 1.0)
     P: np.ndarray = np.linalg.det(full)[:, None, None] * stress @ np.linalg.inv(full).transpose(0, 2, 1)
     return P
