@@ -167,6 +167,7 @@ CONDITIONS = {
     "BodyForce by initial positions": es.BodyForce(lambda X, t: 1e5 * X[:, ::-1], TOP, material=True),
     "BodyForce by initial positions on the device": es.BodyForce(push, TOP, material=True),
     "Clamped": es.Clamped((0.0, 0.0), (-1.0, 0.0)),
+    "Damping": es.Damping(body="free"),
     "Gravity": es.Gravity(1e4, body="free"),
     "Pressure": es.Pressure(1e6, body="free"),
     "Pressure on a face": es.Pressure(lambda x, t: 1e6 * x[:, 0], TOP, normal=(0.0, 1.0)),

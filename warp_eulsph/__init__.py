@@ -14,6 +14,7 @@ from .boundaries import (
     BodyForce,
     Boundary,
     Clamped,
+    Damping,
     Fixed,
     Gravity,
     MirrorGhosts,
@@ -56,6 +57,7 @@ from .scheme.surface_vectors import SurfaceVectors
 from .scheme.tie import Tie
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
+from .settling import settle
 from .simulation import Body, Simulation
 from .space import Space
 from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, WendlandC2, WendlandC4, WendlandC6
@@ -75,6 +77,7 @@ __all__ = [
     "Convected",
     "CubicSpline",
     "Current",
+    "Damping",
     "DimensionlessSensor",
     "Every",
     "Fixed",
@@ -125,6 +128,7 @@ __all__ = [
     "WendlandC6",
     "WhenDistorted",
     "mirror",
+    "settle",
     "spatial_order",
 ]
 

@@ -141,6 +141,11 @@ class Bound:
         return type(self).load is not Bound.load
 
     @property
+    def damps(self) -> bool:
+        """Whether ``damp`` adds forces."""
+        return type(self).damp is not Bound.damp
+
+    @property
     def reads_surface(self) -> bool:
         """Whether ``load`` reads ``state.surface``; where the reference is fixed they move for those that do."""
         return self.loads
@@ -153,6 +158,9 @@ class Bound:
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         """Add forces [N] at time t + fraction · Δt to ``external``."""
+
+    def damp(self, state: Any, clock: Any, forces: Any) -> None:
+        """Add forces [N] that damp motion to both ``forces.external`` and ``forces.damping``; comes after ``load``."""
 
     def evolving(self) -> dict[str, wp.array]:
         """Arrays by name that a step reads before it writes them: what a checkpoint must hold of the condition."""

@@ -104,7 +104,7 @@ class LaxWendroffStepper:
             self.half.surface = U.surface
         self.particles, self.flux, self.configuration = particles, flux, configuration
         self.policy, self.clock, self.conditions = policy, clock, conditions
-        self.forces = allocate(space, "Forces", n, device, empty=("correction", "tie", "external"))
+        self.forces = allocate(space, "Forces", n, device, empty=("correction", "tie", "external", "damping"))
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         self.shifter: Shifter | None = None
         if options.shifting is not None and not policy.fixed:
@@ -124,9 +124,14 @@ class LaxWendroffStepper:
         self.tie: TiedPairs | None = None
         if options.tie is not None:
             self.tie = options.tie.build(space, flux, moving, device)
-        self._zero, self.loaded = wp.zeros(1, dtype=space.vec, device=device), any(c.loads for c in conditions)
+        self._zero, self.loaded = (
+            wp.zeros(1, dtype=space.vec, device=device),
+            any(c.loads or c.damps for c in conditions),
+        )
+        self.damped = any(c.damps for c in conditions)
         # Forces that are always zero take the memory of one
-        there = {"correction": self.stabiliser.corrects, "tie": self.tie is not None, "external": self.loaded}
+        there = {"correction": self.stabiliser.corrects, "tie": self.tie is not None}
+        there |= {"external": self.loaded, "damping": self.damped}
         for name, needed in there.items():
             force = wp.zeros(n, dtype=space.vec, device=device) if needed else repeated(self._zero, n)
             setattr(self.forces, name, force)
@@ -149,7 +154,7 @@ class LaxWendroffStepper:
         for condition in conditions:
             condition.start(U)
         self._after_refresh()
-        self.ledger = Ledger(space, particles, flux, configuration, clock, self.limiter, device)
+        self.ledger = Ledger(space, particles, flux, configuration, clock, self.limiter, device, self.damped)
         self.ledger.open(U)
 
     def step(self) -> None:
@@ -274,6 +279,10 @@ class LaxWendroffStepper:
             forces.external.zero_()
         for condition in self.conditions:
             condition.load(state, self.clock.fields, fraction, forces.external)
+        if self.damped:
+            forces.damping.zero_()
+            for condition in self.conditions:
+                condition.damp(state, self.clock.fields, forces)
 
     def _smooth(self, U: Any, half: Any) -> None:
         self._smooth_field(U.v, self.grad_v, half.v)

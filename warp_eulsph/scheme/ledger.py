@@ -15,19 +15,20 @@ from .reference import Configuration
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
+ACCOUNTS = ("external", "constraint", "damping", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> Any:
+def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool, damped: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
-    The tie's is the power of its force and of its stress, which Q holds and W does not (M16).
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16). The external account
+    leaves out what damps.
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -64,28 +65,31 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
         dt = clock.dt[0]
         total = _Entry()
         for a in range(block * each, wp.min((block + 1) * each, n)):
-            mass = wide(particles.mass[a])
-            v = precise(state.v[a])
+            mass, v = wide(particles.mass[a]), precise(state.v[a])
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
             internal = precise(forces.internal[a])
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
             strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate)
-            tie = wide(0.0)
+            tie, limiter = wide(0.0), wide(0.0)
             if wp.static(tied):
                 tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
                 strain_power -= tied_power
                 tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
             stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
-            limiter = wide(0.0)
             if wp.static(limited):
                 limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
                 stepping -= dW_limited[a]
             if wp.static(smoothed):
                 stepping += mass * wp.dot(precise(dv[a]), v_mean)
+            external, damping = precise(forces.external[a]), wide(0.0)
+            if wp.static(damped):
+                external -= precise(forces.damping[a])
+                damping = dt * wp.dot(precise(forces.damping[a]), v_mean)
             total += wide(particles.share[a]) * _Entry(
-                dt * wp.dot(precise(forces.external[a]), v_mean),
+                dt * wp.dot(external, v_mean),
                 wp.dot(impulse, v_mean),
+                damping,
                 dt * wp.dot(precise(forces.dissipation[a]), v_mean),
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
                 tie,
@@ -197,9 +201,10 @@ class Ledger:
         clock: DeviceClock,
         limiter: Any,
         device: Any,
+        damped: bool = False,
     ):
         n = len(particles.mass)
-        self.space, self.particles, self.flux, self.device = space, particles, flux, device
+        self.space, self.particles, self.flux, self.device, self._damped = space, particles, flux, device, damped
         self._launch = Launcher(device)
         self.configuration, self.clock, self.limiter = configuration, clock, limiter
         self._v_old = wp.zeros(n, dtype=space.vec, device=device)
@@ -243,7 +248,8 @@ class Ledger:
         arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
         arguments += [self.clock.fields, forces]
         tied = len(self.flux.fields.tie) > 0
-        self._book(_make_entries(self.space, tied, self.limiter is not None, smoothed is not None), arguments)
+        limited, smoothes = self.limiter is not None, smoothed is not None
+        self._book(_make_entries(self.space, tied, limited, smoothes, self._damped), arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
