@@ -19,7 +19,7 @@ LAYERS = [
     {"operators"},
     {"scheme", "contact"},
     {"simulation", "looks", "progress", "transport", "diagnostics", "memory", "sorting", "output", "geometry"}
-    | {"arguments", "failure", "settling"},
+    | {"arguments", "failure", "settling", "programs"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

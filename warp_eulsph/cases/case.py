@@ -18,7 +18,7 @@ from ..scheme.time_step import TimeStep
 from ..scheme.verlet import Verlet
 from ..simulation import Body, Simulation
 from .expressions import COORDINATES, nearest
-from .options import Table, choice, one_of
+from .options import Table, choice, one_of, open_choice
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
 from .values import Formula, Number, PlaceFormula
@@ -37,7 +37,7 @@ class BodyTable(Table):
     """A solid: a shape filled with particles, its material, and how it starts."""
 
     shape: one_of(*SHAPES) = Field(description="a function of warp_eulsph.geometry")  # type: ignore[valid-type]
-    material: choice(Material)  # type: ignore[valid-type]
+    material: open_choice(Material)  # type: ignore[valid-type]
     velocity: PlaceFormula = Field(0.0, validate_default=True, description="initial velocity [m/s]")
     volume: PlaceFormula | None = Field(None, description="volumes [m^dim] instead of those of the shape")
     spacing: PlaceFormula | None = Field(None, description="spacings [m]; the dim-th root of the volume by default")
@@ -86,7 +86,7 @@ class Case(Problem):
     """
 
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
-    boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
+    boundary: list[open_choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
