@@ -16,15 +16,15 @@ from .manifest import Manifest, entry_of
 from .snapshot import Frame, checked_precision, collect, encode
 from .temporal import write_index
 
-# The index names every snapshot, so that making it costs more from frame to frame: a tenth more of them is worth it.
-_GROWTH = 1.1
+# The index names every snapshot, so that making it costs more from frame to frame: half as many again are worth it.
+_GROWTH = 1.5
 
 
 class SnapshotWriter:
     """Writes ``snap/0000001200.vtkhdf`` for step 1200, its line in ``manifest.jsonl``, and the lists for ParaView.
 
     ``run.vtkhdf.series`` lists the snapshots with their times; ``run.vtkhdf`` is one file over all of them, renewed
-    when a tenth more have come and by ``finish``. A new writer starts a new run: what an older one left in the
+    when half as many again have come and by ``finish``. A new writer starts a new run: what an older one left in the
     directory moves to ``abandoned/`` there.
 
     Attributes:
