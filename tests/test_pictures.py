@@ -253,10 +253,17 @@ def test_no_cracks_between_cells_and_a_page_that_suits(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("sides", "expected"), [((1.0, 6.0), (380, 700)), ((1.0, 1.0), (800, 700)), ((10.0, 1.0), (1100, 300))]
+    ("sides", "expected"),
+    [
+        ((1.0, 6.0), (380, 700)),
+        ((1.0, 1.0), (800, 700)),
+        ((10.0, 1.0), (1100, 300)),
+        ((1.0, 6.0, 1.0), (700, 700)),
+        ((6.0, 1.0, 1.0), (950, 700)),
+    ],
 )
 def test_pages_are_upright_for_columns_and_flat_for_beams(sides, expected):
-    assert suited(np.array([[0.0, 0.0], sides])) == expected
+    assert suited(np.array([np.zeros(len(sides)), sides])) == expected
 
 
 def test_title_and_first_outline(run, tmp_path):
