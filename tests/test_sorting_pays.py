@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from bodies import RUBBER, lattice
 from test_resume import bits, reachable
-from test_sorting import RUBBER, shuffle, two_blocks
+from test_sorting import shuffle, two_blocks
 
 import warp_eulsph as es
 from warp_eulsph import sorting
@@ -38,7 +39,7 @@ def test_room_in_the_lists_does_not_grow_by_sorting(reference):
 
 def test_stirred_liquids_are_sorted_as_they_part(monkeypatch):
     monkeypatch.setattr(sorting, "STEPS_BETWEEN_SORTS", 50)
-    x = (np.stack(np.meshgrid(*[np.arange(12)] * 3, indexing="ij"), -1).reshape(-1, 3) + 0.5) / 12
+    x = lattice(3, 12)
     cubes = {on: stirred_cube(x, 12, sort=on) for on in (True, False)}
     assert np.array_equal(cubes[True].order.places, np.arange(len(x)))
     for cube in cubes.values():
