@@ -2,7 +2,6 @@
 
 import logging
 import math
-from typing import Any
 
 import numpy as np
 
@@ -16,22 +15,26 @@ STEPS_BETWEEN_LOOKS = 20
 
 
 def residual(simulation: Simulation) -> float:
-    """How far the bodies are from equilibrium [-]: unbalanced forces over those that they must balance.
+    """How far the bodies are from equilibrium [-]: unbalanced forces over loads, or over reactions where nothing loads.
 
-    ‖f_material + f_loads + f_reactions‖ / (‖f_loads‖ + ‖f_reactions‖), roots of sums of squares over the particles in
-    the last step; damping and dissipation, which vanish at rest, left out. Infinite before the first step, and where
-    nothing loads or holds the bodies.
+    Σ|f_material + f_load + f_reaction| / Σ|f_load| over the particles in the last step, damping and dissipation, which
+    vanish at rest, left out. Infinite before the first step, and where nothing loads or holds the bodies. Sums of
+    lengths and not of squares, which the few particles of a clamp would rule.
     """
     forces = simulation.stepper.forces
 
-    def of(name: str) -> Any:
-        values = getattr(forces, name).numpy()
-        return values if len(values) else 0.0
+    def of(name: str) -> np.ndarray:
+        values: np.ndarray = getattr(forces, name).numpy()
+        return values.astype(float)
 
     loads, reactions = of("external") - of("damping"), of("reaction")
     unbalanced = of("internal") + of("correction") + of("tie") + loads + reactions
-    scale = float(np.linalg.norm(loads) + np.linalg.norm(reactions))
-    return float(np.linalg.norm(unbalanced)) / scale if scale > 0.0 else math.inf
+    scale = _sum_of_lengths(loads) or _sum_of_lengths(reactions)
+    return _sum_of_lengths(unbalanced) / scale if scale > 0.0 else math.inf
+
+
+def _sum_of_lengths(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).sum())
 
 
 def settle(simulation: Simulation, tolerance: float = 1e-3, *, until: float) -> float:
