@@ -3,10 +3,24 @@
 import argparse
 from collections.abc import Sequence
 
-from .commands import bench, check, completion, doctor, examples, export, info, plot, resume, run, schema, validate
+from .commands import (
+    bench,
+    check,
+    completion,
+    curve,
+    doctor,
+    examples,
+    export,
+    info,
+    plot,
+    resume,
+    run,
+    schema,
+    validate,
+)
 
 # Each imports what it needs when it runs, so that asking for help is quick.
-COMMANDS = (run, resume, info, check, plot, export, examples, schema, validate, bench, doctor, completion)
+COMMANDS = (run, resume, info, check, plot, curve, export, examples, schema, validate, bench, doctor, completion)
 
 
 def parser() -> argparse.ArgumentParser:

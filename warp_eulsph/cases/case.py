@@ -19,7 +19,7 @@ from .expressions import COORDINATES, nearest
 from .options import Table, choice, one_of, open_choice
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
-from .values import Formula, Number, PlaceFormula
+from .values import Formula, Number, PlaceFormula, ZoneFormula
 
 
 class MirrorPlane(Table):
@@ -37,6 +37,7 @@ class BodyTable(Table):
     shape: one_of(*SHAPES) = Field(description="a function of warp_eulsph.geometry")  # type: ignore[valid-type]
     material: open_choice(Material)  # type: ignore[valid-type]
     velocity: PlaceFormula = Field(0.0, validate_default=True, description="initial velocity [m/s]")
+    cut: ZoneFormula | None = Field(None, description="which particles of the shape are left out, such as a notch")
     volume: PlaceFormula | None = Field(None, description="volumes [m^dim] instead of those of the shape")
     spacing: PlaceFormula | None = Field(None, description="spacings [m]; the dim-th root of the volume by default")
     surface: PlaceFormula | None = Field(
@@ -54,6 +55,16 @@ class BodyTable(Table):
         """The body, without ghosts."""
         x, volume, *given = particles(self.shape, f"body.{name}.shape")
         surface = given[0] if given else None
+        if self.cut is not None:
+            if surface is not None:
+                raise ValueError(
+                    f"body.{name}.cut: a shape with area vectors, {self.shape.kind}, would have none on the cut; "
+                    "take another shape, such as box"
+                )
+            kept = ~self.cut.at(x)[:, 0].astype(bool)
+            if not kept.any():
+                raise ValueError(f"body.{name}.cut: leaves nothing of {len(x)} particles")
+            x, volume = x[kept], np.broadcast_to(volume, len(x))[kept]
         return Body(
             x=x,
             volume=volume if self.volume is None else self.volume.at(x)[:, 0],
