@@ -27,6 +27,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
+from .interactions import Interaction
 from .materials import (
     Bar,
     LinearElastic,
@@ -57,6 +58,7 @@ from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.stabiliser import Correction
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.tie import Tie
+from .scheme.tilt import Tilt
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
 from .settling import settle
@@ -86,6 +88,7 @@ __all__ = [
     "Fixed",
     "FluxCorrectedTransport",
     "Gravity",
+    "Interaction",
     "Lax",
     "LaxWendroff",
     "Linear",
@@ -119,6 +122,7 @@ __all__ = [
     "SurfaceVectors",
     "TaitLiquid",
     "Tie",
+    "Tilt",
     "TimeStep",
     "Traction",
     "UnstableError",

@@ -77,6 +77,7 @@ class MediumPlan:
             device,
             moving=[body for body, moves in zip(flux.bodies, moving, strict=True) if moves],
             corrected=is_corrected(scheme, policy, given),
+            tilt=scheme.tilt,
         )
         return MediumParts(scheme, policy, self.span, own, flux, configuration, moving, given)
 
@@ -85,10 +86,31 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
     """The media of these bodies, in their order.
 
     Raises:
-        ValueError: options that do not suit a material.
+        ValueError: options that do not suit a material, or schemes of different kinds.
     """
-    check_reference([body.material for body in bodies], defaults.reference)
-    return [MediumPlan(bodies, defaults, range(sum(len(body.x) for body in bodies)))]
+    ranges = ranges_of(bodies)
+    media: list[MediumPlan] = []
+    for body in bodies:
+        options = options_of(body, defaults)
+        check_reference([body.material], options.reference)
+        if type(options.scheme) is not type(defaults.scheme):
+            raise ValueError(
+                f"scheme of body {body.name!r} must be {type(defaults.scheme).__name__}(...), as the simulation's, for "
+                f"all take the same steps, got {options.scheme}; pass scheme={type(options.scheme).__name__}(...) to "
+                "the simulation"
+            )
+        together, span = [body], ranges[body.name]
+        if media and media[-1].options == options and media[-1].moves == MediumPlan([body], options, span).moves:
+            before = media.pop()
+            together, span = [*before.bodies, body], range(before.span.start, span.stop)
+        media.append(MediumPlan(together, options, span))
+    return media
+
+
+def options_of(body: Body, defaults: Options) -> Options:
+    """The options of a body: its own, and for those that are None the defaults."""
+    own = {name: getattr(body, name) for name in Options._fields}
+    return defaults._replace(**{name: value for name, value in own.items() if value is not None})
 
 
 def ranges_of(bodies: Sequence[Body]) -> dict[str, range]:

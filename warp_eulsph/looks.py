@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .summary import Rows, as_html, as_text, extent
+from .turns import in_turn
 
 if TYPE_CHECKING:
     from .order import Order
@@ -14,11 +15,13 @@ if TYPE_CHECKING:
 ALL_FORCES = ("internal", "correction", "tie", "dissipation", "external", "reaction")
 
 
+@in_turn()
 class Looks:
     """Fields of a ``Simulation`` in the order of the bodies' particles, copies on the host, and how it is shown."""
 
     bodies: list[Any]
     boundaries: tuple[Any, ...]
+    interactions: tuple[Any, ...]
     space: "Space"
     order: "Order"
     device: Any
@@ -80,6 +83,7 @@ class Looks:
         return f"Simulation: {particles}, {dim}-D, {self.space.real.__name__} on {self.device}", [
             ("bodies", names),
             ("conditions", conditions),
+            ("interactions", ", ".join(type(each).__name__ for each in self.interactions) or "none"),
             ("time", f"{self.t:.6g} s, step {self.steps}, last one {self.dt:.4g} s"),
             ("extent", extent(self.x)),
             ("volume ratio", f"{extrema['least J']:.4g} … {extrema['largest J']:.4g}"),

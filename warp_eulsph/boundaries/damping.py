@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..reduce import SumOfParticles
 from ..space import Space, vector_type
@@ -100,6 +101,7 @@ def _make_damp(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def damp(
+        first: int,
         places: wp.array(dtype=wp.int32),
         particles: Particles,
         state: State,
@@ -107,7 +109,7 @@ def _make_damp(space: Space) -> Any:
         rate: wp.array(dtype=wp.float64),
         forces: Forces,
     ):
-        a = places[wp.tid()]
+        a = places[first + wp.tid()]
         c = rate[0]
         if clock.dt[0] > wp.float64(0.0):
             c = wp.min(c, wp.float64(wp.static(MOST)) / clock.dt[0])
@@ -127,6 +129,7 @@ class BoundDamping(Bound):
 
     def __init__(self, condition: Damping, assembly: Assembly):
         self.space, self.device, self.particles = assembly.space, assembly.device, assembly.particles
+        self._launch = Launcher(assembly.device)
         self.follows = condition.rate is None
         self.indices = assembly.select(None, condition.body, "Damping")
         self._places = assembly.order.places_of(self.indices)
@@ -144,9 +147,9 @@ class BoundDamping(Bound):
         if self.follows:
             arguments = [self._places, self.particles, state, forces, self._x, self._f]
             self._sum(_make_quotient(self.space), arguments, self._sums)
-            wp.launch(_make_follow(), 1, [self._sums, self._rate], device=self.device)
+            self._launch.once(_make_follow(), 1, [self._sums, self._rate])
         arguments = [self._places, self.particles, state, clock, self._rate, forces]
-        wp.launch(_make_damp(self.space), len(self.indices), arguments, device=self.device)
+        self._launch(_make_damp(self.space), len(self.indices), arguments)
 
     def evolving(self) -> dict[str, wp.array]:
         return {"rate": self._rate, "x": self._x, "f": self._f} if self.follows else {}

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..boundaries import Boundary
+from ..building import options_of
 from ..diagnostics import BodySums, SectionForce
 from ..schedule import EverySteps, Schedule
 from ..simulation import Simulation
@@ -181,9 +182,8 @@ def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
 
 def _shape_functions(simulation: Simulation, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
-    n, weight = len(body.x), simulation.stepper.configuration.weight
-    h, volume = (np.broadcast_to(given, n) for given in (simulation.dilation * body.spacing, body.volume))
-    functions = shape_functions(X[None, :], body.x, volume, h, weight)
+    options = options_of(body, simulation.options)
+    functions = shape_functions(X[None, :], body.x, body.volume, options.dilation * body.spacing, options.weight)
     if not functions.inside[0]:
         raise ValueError(
             f"probe {name!r}: X = {X.tolist()} m must lie in body {body.name!r}, whose particles lie in "

@@ -13,14 +13,15 @@ from ..fields import part, part_of
 from ..space import Space
 from .base import Scheme
 from .dissipation import UpwindForces
+from .dual_forces import DualForces
 from .flux import Flux
 from .limiter import MassDiffusion
+from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
 from .shifting import Shifter
 from .stabiliser import Stabiliser
-from .tie import TiedPairs
 from .updates import make_drift, make_kick, make_predict
 
 
@@ -65,7 +66,7 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
-        stabiliser: of its reference. tie, limiter, shifter: None where the options have none.
+        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
         particles, forces, grad_v: of its own particles, views of what the world has.
     """
 
@@ -83,7 +84,8 @@ class Medium:
         smoothing = options.smoothing
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
-        self.stabiliser: Stabiliser = UpwindForces(space, device)
+        plain = self.configuration.plain
+        self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
             if 0 < len(bodies) < len(moving) and not options.correction.by_body:
                 raise ValueError(
@@ -91,9 +93,9 @@ class Medium:
                     f"{options.correction}; arrangement=Current() moves all"
                 )
             self.stabiliser = options.correction.build(space, self.particles, self.flux, bodies, device)
-        self.tie: TiedPairs | None = None
-        if options.tie is not None:
-            self.tie = options.tie.build(space, self.flux, moving, device)
+        self.pairs: PairPotentials | None = None
+        if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
+            self.pairs = PairPotentials(options.tie, plain, space, self.flux, device)
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
@@ -107,17 +109,22 @@ class Medium:
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
 
-    def join(self, states: Sequence[Any], forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
-        """See the own particles of the world's ``states``, of ``forces`` and of ∇v, by its ``clock``."""
-        self._views = [(state, part(self.space, state, "State", self.span)) for state in states]
+    def join(self, U: Any, half: Any, forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
+        """See the own particles of the world's two states, of ``forces`` and of ∇v, by its ``clock``."""
+        self._whole, self._own = U, part(self.space, U, "State", self.span)
+        self._own_half = part(self.space, half, "State", self.span)
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
 
     def of(self, state: Any) -> Any:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
-        return next(view for whole, view in self._views if whole is state)
+        return self._own if state is self._whole else self._own_half
 
     # the reference
+
+    def due(self, step: int, state: Any) -> bool:
+        """Whether the reference is to be refreshed before step number ``step``."""
+        return not self.policy.fixed and self.policy.due(step, self.configuration, self.of(state).F)
 
     def start(self, state: Any) -> None:
         """Make ``state`` the first reference."""
@@ -195,8 +202,8 @@ class Medium:
             epsilon = options.dissipation.epsilon
             if options.dissipation.sensor is not None:
                 d = self.sensors[options.dissipation.sensor].d
-        if self.tie is not None:
-            self.tie.compute(self.configuration, at, self.forces)
+        if self.pairs is not None:
+            self.pairs.compute(self.configuration, at, v, self.grad_v, epsilon, d, self.forces)
         arguments = (self.configuration, self.flux.fields, at.x, v, self.grad_v, epsilon, d, self.forces)
         self.stabiliser.compute(*arguments)
 

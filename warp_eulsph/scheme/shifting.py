@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
@@ -74,6 +75,7 @@ def _make_shift(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(
+        first: int,
         particles: Particles,
         reference: Reference,
         clock: Clock,
@@ -87,7 +89,7 @@ def _make_shift(space: Space) -> Any:
         impulse: wp.array(dtype=vec),
         couple: wp.array(dtype=wp.vec3d),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         delta = psi[a] * (real(0.5) * rate)
         length = wp.length(delta)
         most = bound * particles.spacing[a] * reference.h[a] / particles.h[a]
@@ -118,8 +120,8 @@ def _make_push(space: Space) -> Any:
     vec, Particles = space.vec, structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def push(particles: Particles, impulse: wp.array(dtype=vec), v: wp.array(dtype=vec)):
-        a = wp.tid()
+    def push(first: int, particles: Particles, impulse: wp.array(dtype=vec), v: wp.array(dtype=vec)):
+        a = first + wp.tid()
         v[a] = v[a] + impulse[a] / particles.mass[a]
 
     return push
@@ -141,7 +143,7 @@ class Shifter:
         if any(history is not None for history in flux.histories):
             raise ValueError("shifting cannot remap the history of a material; use shifting=None")
         self.option, self.space, self.particles, self.device = option, space, particles, device
-        n = len(particles.mass)
+        n, self._launch = len(particles.mass), Launcher(device)
         free = np.zeros(n, dtype=np.int32)
         for body in moving:
             free[body.start : body.stop] = 1
@@ -159,6 +161,6 @@ class Shifter:
         option, n = self.option, len(psi)
         arguments = [self.particles, reference, clock, psi, self.free, grad_v, grad_F, option.rate, option.bound, U]
         arguments += [self.impulse, self.projection.couples]
-        wp.launch(_make_shift(self.space), n, arguments, device=self.device)
+        self._launch(_make_shift(self.space), n, arguments)
         self.projection(U.x, self.impulse)
-        wp.launch(_make_push(self.space), n, [self.particles, self.impulse, U.v], device=self.device)
+        self._launch(_make_push(self.space), n, [self.particles, self.impulse, U.v])
