@@ -22,7 +22,8 @@ LAYERS = [
     {"body", "overlap"},
     {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building"},
     {"output"},  # below what it records, of which it knows protocols only
-    {"simulation", "looks", "transport"},
+    {"simulation", "looks", "transport", "programs"},
+    {"settling"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

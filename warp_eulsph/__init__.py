@@ -14,6 +14,7 @@ from .boundaries import (
     BodyForce,
     Boundary,
     Clamped,
+    Damping,
     Fixed,
     Gravity,
     MirrorGhosts,
@@ -60,6 +61,7 @@ from .scheme.tie import Tie
 from .scheme.tilt import Tilt
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
+from .settling import settle
 from .simulation import Body, Simulation
 from .space import Space
 from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, WendlandC2, WendlandC4, WendlandC6
@@ -80,6 +82,7 @@ __all__ = [
     "Correction",
     "CubicSpline",
     "Current",
+    "Damping",
     "DimensionlessSensor",
     "Every",
     "Fixed",
@@ -133,6 +136,7 @@ __all__ = [
     "WendlandC6",
     "WhenDistorted",
     "mirror",
+    "settle",
     "spatial_order",
 ]
 

@@ -142,6 +142,11 @@ class Bound:
         return type(self).load is not Bound.load
 
     @property
+    def damps(self) -> bool:
+        """Whether ``damp`` adds forces."""
+        return type(self).damp is not Bound.damp
+
+    @property
     def reads_surface(self) -> bool:
         """Whether ``load`` reads ``state.surface``; where the reference is fixed they move for those that do."""
         return self.loads
@@ -159,6 +164,9 @@ class Bound:
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         """Add forces [N] at time t + fraction · Δt to ``external``."""
+
+    def damp(self, state: Any, clock: Any, forces: Any) -> None:
+        """Add forces [N] that damp motion to both ``forces.external`` and ``forces.damping``; comes after ``load``."""
 
     def limit(self, state: Any, clock: Any) -> None:
         """Ask for a shorter step, before it is chosen, for what ``load`` may do in it.

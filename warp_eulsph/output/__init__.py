@@ -1,7 +1,7 @@
 """What a run leaves on disk and says about itself; the only room that knows HDF5."""
 
 from .directory import BusyError, RunDirectory
-from .fields import FIELDS, TRANSPORT_FIELDS
+from .fields import DEFAULT_FIELDS, FIELDS, TRANSPORT_FIELDS
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
 from .reader import Comparison, Run, RunFrame, points_on_line
 from .record import ChangedCaseError, Outcome, record
@@ -13,6 +13,7 @@ from .snapshot import Snapshot, read_snapshot, write_snapshot
 from .stopping import Stop
 
 __all__ = [
+    "DEFAULT_FIELDS",
     "FIELDS",
     "TRANSPORT_FIELDS",
     "BodyProbe",

@@ -21,7 +21,7 @@ class Recording:
 
     Args:
         snapshots: when a snapshot is written besides the start and the end.
-        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``) in them; all by default.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``) in them; ``DEFAULT_FIELDS`` (or all of these) by default.
         dtype: ``np.float32`` or ``np.float64`` of their reals.
         region: which particles are in them (see ``Region`` of the boundaries), by initial positions or numbers; all by
             default. Their numbers are in the field ``particle``. Log, probes and checkpoints are of all particles.
