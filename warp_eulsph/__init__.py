@@ -26,6 +26,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
+from .options import explain_mistakes
 from .materials import (
     Bar,
     LinearElastic,
@@ -128,4 +129,5 @@ __all__ = [
     "spatial_order",
 ]
 
+explain_mistakes(__all__, globals())
 sum_up_compiling()

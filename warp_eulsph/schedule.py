@@ -103,9 +103,10 @@ class AtTimes(Schedule):
     times: Sequence[float] = ()
 
     def __post_init__(self) -> None:
-        times = tuple(float(time) for time in self.times)
-        if not all(math.isfinite(time) for time in times) or list(times) != sorted(set(times)):
-            raise ValueError(f"times must be finite and increase [s], got {list(self.times)}")
+        given = real_array(self.times if isinstance(self.times, np.ndarray) else list(self.times), "times")
+        times = tuple(given.tolist()) if given.ndim == 1 else ()
+        if given.ndim != 1 or list(times) != sorted(set(times)):
+            raise ValueError(f"times must be finite and increase [s], got {given.tolist()}")
         object.__setattr__(self, "times", times)
 
     def due(self, t: float, step: int) -> bool:

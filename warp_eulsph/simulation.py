@@ -9,7 +9,7 @@ import warp as wp
 from .arguments import check_options, warn
 from .body import Body, checked_bodies
 from .boundaries import Assembly, Boundary
-from .checks import check_restorable, checked_box, objects, real_number
+from .checks import check_restorable, checked_box, objects, real_number, whole_number
 from .diagnostics import Diagnostics
 from .execution import graphs
 from .failure import failure, where
@@ -182,8 +182,8 @@ class Simulation(Looks):
 
     def step(self, count: int = 1) -> None:
         """Take ``count`` steps of the scheme's own length, aiming at no time."""
+        end = self.steps + whole_number(count, 0, "count of steps")
         self.clock.aim(np.inf)
-        end = self.steps + count
         while self.steps < end:
             self._take_steps(end - self.steps)
 

@@ -1,5 +1,6 @@
 """Shapes as particles."""
 
+from ..options import explain_mistakes
 from .annulus import annulus
 from .filling import BodyCentred, Filling, Lattice, Staggered
 from .lattice import box, nodes
@@ -26,3 +27,5 @@ __all__ = [
     "sphere",
     "tube",
 ]
+
+explain_mistakes(__all__, globals())

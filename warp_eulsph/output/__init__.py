@@ -1,5 +1,6 @@
 """What a run leaves on disk and says about itself; the only room that knows HDF5."""
 
+from ..options import explain_mistakes
 from .directory import BusyError, RunDirectory
 from .fields import FIELDS, TRANSPORT_FIELDS
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
@@ -43,3 +44,5 @@ __all__ = [
     "table",
     "write_snapshot",
 ]
+
+explain_mistakes(__all__, globals())
