@@ -25,6 +25,7 @@ def begin(directory, until):
     record(simulation, directory, until, recording(simulation, checkpoint=0.02), resume=True)
 
 
+@pytest.mark.of_the_cpu
 @pytest.mark.skipif(sys.platform == "win32", reason="no fork")
 def test_thirty_kills_at_random_moments_lose_nothing(tmp_path):
     begin(tmp_path / "whole", LONG)

@@ -1,10 +1,12 @@
 """Arrays that users give go where they say, in every order and shape, or are refused; those they get are read-only."""
 
+import inspect
 import logging
 
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kept_runs import plate
@@ -14,8 +16,9 @@ from warp_eulsph.boundaries import Assembly
 from warp_eulsph.geometry import box
 from warp_eulsph.operators.neighbours import MOST_PAIRS
 from warp_eulsph.order import Order
+from warp_eulsph.output import Recording
+from warp_eulsph.schedule import AnyOf, AtTimes
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 X = plate().X
 N = len(X)
 
@@ -72,8 +75,8 @@ def test_mirror_ghosts_in_any_order_copy_their_own_source():
     assert np.array_equal(one.x, other.x)
 
 
-def test_regions_that_cannot_be_meant_are_refused():
-    assembly = Assembly(es.Space(2), wp.get_device("cpu"), X, None, {"plate": range(N)}, Order(N, "cpu"))
+def test_regions_that_cannot_be_meant_are_refused(device):
+    assembly = Assembly(es.Space(2), device, X, None, {"plate": range(N)}, Order(N, device))
     assert assembly.select([7, 3, 7, 5, 3], None, "who").tolist() == [7, 3, 5]
     for region, message in [
         (np.arange(4)[:, None], r"who: region indices must have shape \(k,\), got \(4, 1\)"),
@@ -196,11 +199,48 @@ def test_wrong_kinds_say_what_to_write():
         (lambda: es.Body(x=np.arange(4.0), volume=1.0, material=RUBBER), r"in 1-D give x\[:, None\]"),
         (lambda: es.Every(1.5), "must be a whole number, at least 1, got 1.5"),
         (lambda: es.Every(True), "must be a whole number, at least 1, got True"),
+        (lambda: es.TimeStep(cfl="0.5"), "TimeStep: cfl must be a number or None, got '0.5'"),
+        (lambda: es.TimeStep(growth=None), "TimeStep: growth must be a number, got None"),
+        (lambda: es.Verlet(dissipation=es.Upwind), r"must be such as Upwind\(\.\.\.\) or None, .*; write Upwind\("),
+        (lambda: es.Verlet(tie=True), r"Verlet: tie must be such as Tie\(\.\.\.\) or None, got True"),
+        (lambda: es.Verlet(correction="Balance"), r"correction must be such as Balance\(\.\.\.\) or None, got 'Bal"),
+        (lambda: es.LaxWendroff(smoothing=3), "LaxWendroff: smoothing must be such as"),
+        (lambda: es.NeoHookean(density=None, young=1.0, poisson=0.3), "density must be a number, got None"),
+        (lambda: es.Simulation(body, sort="no"), "sort must be True or False, got 'no'"),
+        (lambda: es.Simulation(body).step(1.5), "count of steps must be a whole number, at least 0, got 1.5"),
+        (lambda: es.Simulation(body).run(until=1e-9, output=3), "directory must be such as 'runs/column', got int 3"),
+        (lambda: es.Simulation(body, boundaries=[es.Fixed(lambda x, y: x < y)]), "function of 1 argument such as"),
+        (lambda: stepped(es.Velocity(None, value=lambda t: t)), "value must be a function of 2 arguments such as"),
+        (lambda: AtTimes(0.1), "times must be finite and increase"),
+        (lambda: AtTimes("12"), "times must be real numbers"),
+        (lambda: AnyOf([3]), r"schedules\[0\] must be such as EveryTime"),
+        (lambda: Recording(fields="velocity"), r"fields must be a list of names, got 'velocity'; write \['velocity'\]"),
+        (lambda: Recording(snapshots=0.1), "snapshots must be such as EveryTime"),
+        (lambda: box((0.0, 0.0), (1.0, 1.0), "0.1"), "spacing must be a number, got '0.1'"),
     ]:
         with pytest.raises(ValueError, match=message):
             make()
     one, listed = (es.Simulation(body, boundaries=given) for given in (es.Fixed(), [es.Fixed()]))
     assert len(one.boundaries) == len(listed.boundaries) == 1
+
+
+def test_unknown_keywords_say_who_takes_them():
+    body = plate().bodies[0]
+    for make, message in [
+        (
+            lambda: es.Verlet(cfl=3),
+            r"^Verlet takes no 'cfl'; TimeStep\(cfl=\.\.\.\) does\. Verlet takes dissipation, corr",
+        ),
+        (lambda: es.LaxWendroff(cfl=0.3), r"TimeStep\(cfl=\.\.\.\) does"),
+        (lambda: es.Simulation(body, cfl=0.3), r"TimeStep\(cfl=\.\.\.\) does"),
+        (lambda: es.Simulation(body, material=RUBBER), r"; Body\(material=\.\.\.\) "),
+        (lambda: es.Fixed(axis=[0]), r"Fixed takes no 'axis'; did you mean axes\?"),
+        (lambda: es.Never(steps=3), r"Every\(steps=\.\.\.\) does\. Never has no options"),
+        (lambda: Recording(until=1.0), "Recording takes no 'until'. Recording takes snapshots, fields"),
+    ]:
+        with pytest.raises(TypeError, match=message):
+            make()
+    assert list(inspect.signature(es.TimeStep).parameters) == ["cfl", "growth", "fixed"]
 
 
 def block(corner, name, spacing=0.1, dim=2):

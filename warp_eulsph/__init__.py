@@ -26,7 +26,6 @@ from .boundaries import (
     Wall,
     mirror,
 )
-from .options import explain_mistakes
 from .materials import (
     Bar,
     LinearElastic,
@@ -40,19 +39,22 @@ from .materials import (
 )
 from .notices import sum_up_compiling
 from .operators.values import Linear, Shepard
+from .options import explain_mistakes
 from .order import spatial_order
 from .scheme.arrangement import Arrangement, Convected, Current
 from .scheme.balance import Balance
+from .scheme.base import Scheme
 from .scheme.dissipation import Upwind
 from .scheme.health import UnstableError
 from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff
 from .scheme.limiter import FluxCorrectedTransport
 from .scheme.pair_areas import PairAreas
-from .scheme.reference import Always, Every, Never, ReferencePolicy, WhenDistorted
+from .scheme.policy import Always, Every, Never, ReferencePolicy, WhenDistorted
 from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
 from .scheme.shifting import Shifting
 from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
+from .scheme.stabiliser import Correction
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.tie import Tie
 from .scheme.time_step import TimeStep
@@ -74,6 +76,7 @@ __all__ = [
     "BrokenError",
     "Clamped",
     "Convected",
+    "Correction",
     "CubicSpline",
     "Current",
     "DimensionlessSensor",
@@ -104,6 +107,7 @@ __all__ = [
     "Region",
     "Roller",
     "SaintVenantKirchhoff",
+    "Scheme",
     "Sensor",
     "Shepard",
     "Shifting",

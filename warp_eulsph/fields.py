@@ -103,6 +103,19 @@ def arrays(fields: Any, group: str) -> dict[str, wp.array]:
     return {f"{group}.{name}": getattr(fields, name) for name in GROUPS[group]}
 
 
+def part(space: Space, fields: Any, group: str, span: range) -> Any:
+    """A group's struct for the particles in ``span`` alone, whose arrays are views; itself where these are all."""
+    views = structure(space, group)()
+    for name in GROUPS[group]:
+        setattr(views, name, part_of(getattr(fields, name), span))
+    return fields if all(getattr(views, name) is getattr(fields, name) for name in GROUPS[group]) else views
+
+
+def part_of(array: wp.array, span: range) -> wp.array:
+    """The view of an array on the particles in ``span``; itself where these are all, or where it is empty."""
+    return array if len(array) in (0, len(span)) else array[span.start : span.stop]
+
+
 @functools.cache
 def neighbour_structure(space: Space) -> Any:
     """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import warp as wp
 
 from .summary import Rows, as_html, as_text, extent
 
@@ -58,10 +57,7 @@ class Looks:
     @property
     def strain_energy_density(self) -> np.ndarray:
         """Stored energy per initial volume Ψ [J/m³], (n,)."""
-        flux, F = self.stepper.flux, self.stepper.U.F
-        stored = wp.empty(len(F), dtype=wp.float64, device=self.device)
-        flux.energy(F, stored)
-        return self.order.by_number(stored.numpy() / self.particles.V0.numpy())
+        return self.order.by_number(self.stepper.ledger.stored_by_particle(self.stepper.U) / self.particles.V0.numpy())
 
     @property
     def force(self) -> np.ndarray:

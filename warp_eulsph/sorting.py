@@ -10,8 +10,9 @@ import warp as wp
 
 from .fields import structure
 from .order import Order, spatial_order
-from .scheme.lax_wendroff import LaxWendroffStepper
+from .scheme.medium import Medium
 from .scheme.reference import reference_spacing
+from .scheme.stepper import Stepper
 from .space import Space, difference
 
 log = logging.getLogger(__name__)
@@ -69,7 +70,7 @@ class Sorting:
         on: False leaves all where they are.
     """
 
-    def __init__(self, stepper: LaxWendroffStepper, order: Order, on: bool):
+    def __init__(self, stepper: Stepper, order: Order, on: bool):
         self.stepper, self.order = stepper, order
         self.space, self.device = stepper.space, stepper.device
         self.on = on and all(condition.sortable for condition in stepper.conditions)
@@ -83,7 +84,7 @@ class Sorting:
 
     def steps_left(self, step: int) -> int | None:
         """Steps from step number ``step`` to the next look; None if there is none."""
-        if not self.on or self.stepper.policy.fixed:
+        if not self.on or all(medium.policy.fixed for medium in self.stepper.media):
             return None
         return STEPS_BETWEEN_SORTS - step % STEPS_BETWEEN_SORTS
 
@@ -106,13 +107,14 @@ class Sorting:
     def parted(self, places: np.ndarray | None = None) -> float:
         """Share of the particles that are far from the one before them, in memory or were they at these places, (n,),
         instead; reads the device."""
-        stepper, configuration = self.stepper, self.stepper.configuration
-        chosen = np.arange(stepper.n) if places is None else places
         self._count.zero_()
-        arguments = [wp.array(chosen, dtype=wp.int32, device=self.device), stepper.particles, configuration.fields]
-        arguments += [configuration.lists.box, self._count]
-        wp.launch(_make_count_parted(self.space), stepper.n - 1, arguments, device=self.device)
-        return int(self._count.numpy()[0]) / stepper.n
+        for medium in self.stepper.media:
+            span, configuration = medium.span, medium.configuration
+            chosen = np.arange(medium.n) if places is None else places[span.start : span.stop] - span.start
+            arguments = [wp.array(chosen, dtype=wp.int32, device=self.device), medium.particles, configuration.fields]
+            arguments += [configuration.lists.box, self._count]
+            wp.launch(_make_count_parted(self.space), medium.n - 1, arguments, device=self.device)
+        return int(self._count.numpy()[0]) / self.stepper.n
 
     def permute(self, places: np.ndarray) -> None:
         """Move the particles at these places, (n,), to the places 0, 1, …, each body within its range.
@@ -127,25 +129,32 @@ class Sorting:
 
     def sorted_places(self) -> np.ndarray:
         """Places in the order that particles should have, each body within its range, (n,)."""
-        stepper, configuration = self.stepper, self.stepper.configuration
-        reference, particles = configuration.fields, stepper.particles
+        return np.concatenate([medium.span.start + self._sorted_places(medium) for medium in self.stepper.media])
+
+    def _sorted_places(self, medium: Medium) -> np.ndarray:
+        """The same of one medium, counted from its first particle."""
+        reference, particles = medium.configuration.fields, medium.particles
         x = reference.x.numpy().astype(float)
-        box = np.array(configuration.lists.box, dtype=float)
+        box = np.array(medium.configuration.lists.box, dtype=float)
         x -= box * np.floor(np.divide(x, box, out=np.zeros_like(x), where=box > 0.0))
         spacing = particles.spacing.numpy() * reference.h.numpy() / particles.h.numpy()
         sorted_bodies = [
             body.start + spatial_order(x[body.start : body.stop], float(np.median(spacing[body.start : body.stop])))
-            for body in stepper.flux.bodies
+            for body in medium.flux.bodies
         ]
         return np.concatenate(sorted_bodies)
 
     def _arrays(self) -> Iterator[tuple[wp.array, range]]:
         """What evolves and has an element for each particle, and the particles that each array is of."""
-        stepper, n = self.stepper, self.stepper.n
-        conditions = [array for condition in stepper.conditions for array in condition.evolving().values()]
-        own = {id(array) for array in conditions}  # they go by number
-        bodies = dict(zip(map(id, stepper.flux.histories), stepper.flux.bodies, strict=True))
+        stepper = self.stepper
+        own = {id(array) for condition in stepper.conditions for array in condition.evolving().values()}
+        spans: dict[int, range] = {}
+        for medium in stepper.media:
+            first = medium.span.start
+            spans |= {id(array): medium.span for array in medium.evolving().values()}
+            for history, body in zip(medium.flux.histories, medium.flux.bodies, strict=True):
+                spans[id(history)] = range(first + body.start, first + body.stop)
         for array in stepper.evolving().values():
-            body = bodies.get(id(array), range(n))
-            if len(array) == len(body) and id(array) not in own:
-                yield array, body
+            span = spans.get(id(array), range(stepper.n))
+            if len(array) == len(span) and id(array) not in own:  # those of conditions go by number
+                yield array, span

@@ -11,11 +11,9 @@ from ..boundaries.mirror import Image
 from ..materials import Material
 from ..output import FIELDS, Probe
 from ..scheme.arrangement import Arrangement
-from ..scheme.lax import Lax
-from ..scheme.lax_wendroff import LaxWendroff
-from ..scheme.reference import ReferencePolicy
+from ..scheme.base import Scheme
+from ..scheme.policy import ReferencePolicy
 from ..scheme.time_step import TimeStep
-from ..scheme.verlet import Verlet
 from ..simulation import Body, Simulation
 from .expressions import COORDINATES, nearest
 from .options import Table, choice, one_of
@@ -86,7 +84,7 @@ class Case(Problem):
     boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
-    scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
+    scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
     sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
     output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]

@@ -32,9 +32,6 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from ..geometry import Patch
-from ..scheme.balance import Balance
-from ..scheme.pair_areas import PairAreas
-from ..scheme.surface_vectors import SurfaceVectors
 from .values import Formula, Number, PathText, PlaceTimeFormula, Whole, ZoneFormula, reading
 
 
@@ -66,8 +63,9 @@ class Options(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Options":
-        """The class's own checks, so that their message stands beside all others; formulas come to them later."""
-        if isinstance(self.target, type) and not any(isinstance(value, Formula) for _, value in self):
+        """The class's own checks, which stand beside all others; formulas and conditions come later."""
+        later = any(name == "boundary" or isinstance(value, Formula) for name, value in self)
+        if isinstance(self.target, type) and not later:
             self.make()
         return self
 
@@ -145,8 +143,6 @@ def _written(name: str, hint: Any) -> Any:
         return Zone | None
     if name in ("value", "displacement"):
         return PlaceTimeFormula
-    if name == "correction":
-        return choice(Balance, SurfaceVectors, PairAreas, optional=True)
     if name == "boundary":
         return Whole  # which of the case's conditions, from 0
     members = typing.get_args(hint) if typing.get_origin(hint) in (Union, types.UnionType) else (hint,)

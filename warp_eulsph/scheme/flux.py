@@ -12,7 +12,8 @@ from ..fields import allocate, clock_structure, structure
 from ..linalg import det, inverse, largest_shortening
 from ..materials import Law, Material
 from ..space import Space
-from .reference import Always, Configuration, Every, ReferencePolicy, resolution
+from .policy import Always, Every, ReferencePolicy
+from .reference import Configuration, resolution
 
 
 @functools.cache
@@ -230,8 +231,7 @@ class Flux:
             self._launch(kernel, part.size, arguments, part.first)
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
-        """Wave speeds measured in the reference, and the largest rate of waves or strain [1/s] into ``clock.rate``."""
-        clock.rate.zero_()
+        """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
         for part in self.parts:
             arguments = [F, grad_v, self.particles, configuration.fields, part.constants, self.fields, clock]
             kernel = _make_wave_speeds(self.space, part.law, configuration.fixed)

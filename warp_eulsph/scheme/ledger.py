@@ -1,17 +1,17 @@
 """Where the energy went: one account per mechanism, and the residual that closes the books."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..execution import Launcher
-from ..fields import clock_structure, structure
+from ..fields import clock_structure, part_of, structure
 from ..reduce import Sum, SumOfParticles
 from ..space import Space, matrix_type, vector_type
-from .flux import Flux
-from .reference import Configuration
+from .medium import Medium
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
@@ -182,38 +182,37 @@ def _make_book() -> Any:
     return book
 
 
+class _Page:
+    """The books of one medium: what its particles have in the arrays of all."""
+
+    def __init__(self, medium: Medium, v_old: wp.array, W_old: wp.array, W: wp.array, dW_limited: wp.array):
+        self.medium, span = medium, medium.span
+        self.v_old, self.W_old, self.W = (part_of(array, span) for array in (v_old, W_old, W))
+        self.dW_limited = part_of(dW_limited, span)
+        self.sum_entries = SumOfParticles(_Entry, medium.n, v_old.device)
+
+
 class Ledger:
-    """Energy accounts on the device, booked every step in float64 and read when asked.
+    """Energy accounts on the device, booked every step in float64 and read when asked."""
 
-    ``limiter`` is None, or has the velocity change ``dv`` [m/s] that it made in the step, (n,) of vec.
-    """
-
-    def __init__(
-        self,
-        space: Space,
-        particles: Any,
-        flux: Flux,
-        configuration: Configuration,
-        clock: DeviceClock,
-        limiter: Any,
-        device: Any,
-    ):
+    def __init__(self, space: Space, particles: Any, media: Sequence[Medium], clock: DeviceClock, device: Any):
         n = len(particles.mass)
-        self.space, self.particles, self.flux, self.device = space, particles, flux, device
+        self.space, self.particles, self.clock, self.device = space, particles, clock, device
         self._launch = Launcher(device)
-        self.configuration, self.clock, self.limiter = configuration, clock, limiter
+        limited = any(medium.limiter is not None for medium in media)
         self._v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
-        self._dW_limited = wp.zeros(n if limiter is not None else 0, dtype=wp.float64, device=device)
+        self._dW_limited = wp.zeros(n if limited else 0, dtype=wp.float64, device=device)
+        self._pages = [_Page(medium, self._v_old, self._W_old, self._W, self._dW_limited) for medium in media]
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
-        self._energy = wp.zeros(1, dtype=wp.float64, device=device)
-        self._sum_entries, self._sum = SumOfParticles(_Entry, n, device), Sum(wp.float64, n, device)
+        self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self.start, self._most = 0.0, 0.0
 
     def open(self, U: Any) -> None:
         """Start the books at state ``U``."""
         wp.copy(self._v_old, U.v)
-        self.flux.energy(U.F, self._W_old)
+        for page in self._pages:
+            page.medium.flux.energy(page.medium.of(U).F, page.W_old)
         self._total.zero_()
         self.start = self.kinetic(U) + self.stored(U)
 
@@ -222,36 +221,47 @@ class Ledger:
         return {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
 
     def open_limiter(self, U: Any) -> None:
-        """Note the stored energies before the limiter changes ``U``."""
-        self.flux.energy(U.F, self._dW_limited)
+        """Note the stored energies before limiters change ``U``."""
+        for page in self._limited():
+            page.medium.flux.energy(page.medium.of(U).F, page.dW_limited)
 
     def close_limiter(self, U: Any) -> None:
-        """Note what the limiter did to the stored energies."""
-        self.flux.energy(U.F, self._W)
-        wp.launch(_make_subtract(), len(self._W), [self._W, self._dW_limited], device=self.device)
+        """Note what limiters did to the stored energies."""
+        for page in self._limited():
+            page.medium.flux.energy(page.medium.of(U).F, page.W)
+            wp.launch(_make_subtract(), len(page.W), [page.W, page.dW_limited], device=self.device)
 
-    def record(self, U: Any, half: Any, grad_v: wp.array, forces: Any, smoothed: wp.array | None = None) -> None:
-        """Book a step that ended in ``U``, with the half state, ∇v^{n+½} and the forces of the full step.
+    def _limited(self) -> list[_Page]:
+        return [page for page in self._pages if page.medium.limiter is not None]
 
-        ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (n,) of vec.
+    def record(self, U: Any, half: Any, smoothed: Sequence[wp.array] | None = None) -> None:
+        """Book a step that ended in ``U``, with the half state; its media have ∇v^{n+½} and the forces.
+
+        ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (particles of the medium,) of vec for each.
         """
-        self.flux.energy(U.F, self._W)
-        arguments = [self.particles, self.configuration.fields, U, half, self.flux.fields, grad_v]
-        dv = smoothed
-        if dv is None:
-            dv = self.limiter.dv if self.limiter is not None else self._v_old
-        arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
-        arguments += [self.clock.fields, forces]
-        tied = len(self.flux.fields.tie) > 0
-        self._book(_make_entries(self.space, tied, self.limiter is not None, smoothed is not None), arguments)
+        for k, page in enumerate(self._pages):
+            medium, limiter = page.medium, page.medium.limiter
+            flux = medium.flux
+            flux.energy(medium.of(U).F, page.W)
+            arguments = [medium.particles, medium.configuration.fields, medium.of(U), medium.of(half)]
+            dv = page.v_old if limiter is None else limiter.dv
+            if smoothed is not None:
+                dv = smoothed[k]
+            arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
+            arguments += [self.clock.fields, medium.forces]
+            tied = len(flux.fields.tie) > 0
+            self._book(page, _make_entries(self.space, tied, limiter is not None, smoothed is not None), arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
-        self.flux.energy(U.F, self._W)
-        self._book(_make_shift_entry(self.space), [self.particles, U, self._v_old, self._W_old, self._W])
+        for page in self._pages:
+            medium = page.medium
+            medium.flux.energy(medium.of(U).F, page.W)
+            arguments = [medium.particles, medium.of(U), page.v_old, page.W_old, page.W]
+            self._book(page, _make_shift_entry(self.space), arguments)
 
-    def _book(self, kernel: Any, arguments: list[Any]) -> None:
-        self._sum_entries(kernel, arguments, self._step)
+    def _book(self, page: _Page, kernel: Any, arguments: list[Any]) -> None:
+        page.sum_entries(kernel, arguments, self._step)
         self._launch.once(_make_book(), 1, [self._step, self._total])
 
     def kinetic(self, U: Any) -> float:
@@ -260,9 +270,18 @@ class Ledger:
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
+    def stored_by_particle(self, U: Any) -> np.ndarray:
+        """Stored energy [J] of each particle, by place, (n,); reads the device."""
+        self._store(U)
+        return self._W.numpy().copy()
+
+    def _store(self, U: Any) -> None:
+        for page in self._pages:
+            page.medium.flux.energy(page.medium.of(U).F, page.W)
+
     def stored(self, U: Any) -> float:
         """Stored energy [J]; reads the device."""
-        self.flux.energy(U.F, self._W)
+        self._store(U)
         wp.launch(_make_own(self.space), len(self._W), [self.particles, self._W], device=self.device)
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])

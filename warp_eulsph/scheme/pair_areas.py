@@ -14,11 +14,11 @@ from ..space import Space, difference
 from .dissipation import UpwindForces, blend, upwind
 from .flux import Flux
 from .reference import Configuration
-from .stabiliser import Stabiliser
+from .stabiliser import Correction, Stabiliser
 
 
 @dataclass(frozen=True)
-class PairAreas:
+class PairAreas(Correction):
     """Force correction that makes a moving reference stable (M11, M12); momentum stays exact.
 
     Args:

@@ -1,11 +1,8 @@
-"""The reference configuration k, and the one knob: when it is refreshed."""
+"""The reference configuration k: positions, volumes, corrections and neighbour lists in which weights live."""
 
 import functools
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from numbers import Integral
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -21,76 +18,7 @@ from ..operators.neighbours import NeighbourLists
 from ..operators.values import Values
 from ..space import Space, difference
 from ..weights import Weight
-
-
-class ReferencePolicy(ABC):
-    """When the reference is refreshed: k = 0 total Lagrangian … k = n Eulerian."""
-
-    #: The initial configuration is the only reference there will be.
-    fixed = False
-    #: ``due`` can tell from the number of the step alone, many steps ahead.
-    by_count: ClassVar[bool] = False
-
-    @abstractmethod
-    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
-        """Whether to refresh before step number ``step`` (0 is the first; the reference is fresh then)."""
-
-
-@dataclass(frozen=True)
-class Never(ReferencePolicy):
-    """Total Lagrangian: the initial configuration stays the reference."""
-
-    fixed = True
-    by_count = True
-
-    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
-        return False
-
-
-@dataclass(frozen=True)
-class Every(ReferencePolicy):
-    """Updated Lagrangian: refresh every ``steps`` steps."""
-
-    steps: int
-    by_count: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        if isinstance(self.steps, bool) or not isinstance(self.steps, Integral) or self.steps < 1:
-            raise ValueError(
-                f"steps between refreshes must be a whole number, at least 1, got {self.steps!r}; Never() is total "
-                "Lagrangian"
-            )
-
-    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
-        return step % self.steps == 0
-
-
-@dataclass(frozen=True)
-class Always(ReferencePolicy):
-    """Eulerian: every step starts from its own configuration."""
-
-    by_count = True
-
-    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
-        return True
-
-
-@dataclass(frozen=True)
-class WhenDistorted(ReferencePolicy):
-    """Updated Lagrangian by criterion: refresh when a stretch since the last refresh leaves [1/ratio, ratio].
-
-    The stretches are those of G = F F_k⁻¹; rotations do not count. Reads one number from the device each step.
-    """
-
-    ratio: float = 1.2
-
-    def __post_init__(self) -> None:
-        if not self.ratio > 1.0:
-            raise ValueError(f"distortion ratio must be greater than 1, got {self.ratio}")
-
-    def due(self, step: int, configuration: "Configuration", F: wp.array) -> bool:
-        return configuration.distortion(F) > self.ratio
-
+from .refresh import BY_HOST
 
 # The smoothing length follows the volume between these, so that one particle cannot make the lists endless.
 LEAST_GROWTH, LARGEST_GROWTH = 0.5, 2.0
@@ -263,10 +191,7 @@ class Configuration:
 
     def refresh(self, state: Any) -> None:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
-        self.move(state)
-        self.lists.sum_counts()
-        self.lists.make_room()
-        self.renew()
+        BY_HOST(lambda: self.move(state), [self.lists], self.renew)
 
     def move(self, state: Any) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""

@@ -34,7 +34,7 @@ class LinearAdvection:
             raise ValueError(f"advection velocity must be finite, got {self.velocity} m/s")
 
 
-class Scheme(ABC):
+class ScalarScheme(ABC):
     """How one step advances U."""
 
     smoothing: Smoothing | None
@@ -45,7 +45,7 @@ class Scheme(ABC):
 
 
 @dataclass(frozen=True)
-class OneStepLax(Scheme):
+class OneStepLax(ScalarScheme):
     """U^{n+1} = S(Uⁿ) − Δt ∇·f(Uⁿ): first order, stable to CFL 1 on three particles.
 
     Args:
@@ -62,7 +62,7 @@ class OneStepLax(Scheme):
 
 
 @dataclass(frozen=True)
-class TwoStepLaxWendroff(Scheme):
+class TwoStepLaxWendroff(ScalarScheme):
     """U^{n+½} = S(Uⁿ) − Δt/2 ∇·f(Uⁿ), U^{n+1} = Uⁿ − Δt ∇·f(U^{n+½}) (P8): second order, CFL 2 on three particles.
 
     Args:
@@ -166,7 +166,7 @@ class ConservationLaw:
         U: np.ndarray,
         *,
         flux: Any,
-        scheme: Scheme = TwoStepLaxWendroff(),
+        scheme: ScalarScheme = TwoStepLaxWendroff(),
         weight: Weight = CubicSpline(),
         dilation: float = 1.3,
         periodic: Sequence[float] | None = None,

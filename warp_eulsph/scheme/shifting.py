@@ -2,14 +2,12 @@
 
 import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from ..boundaries import Bound
 from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
@@ -48,14 +46,14 @@ class Shifting:
             )
 
     def build(
-        self, space: Space, particles: Any, flux: Flux, moving: list[range], conditions: Sequence[Bound], device: Any
+        self, space: Space, particles: Any, flux: Flux, moving: list[range], held: np.ndarray, device: Any
     ) -> "Shifter":
-        """Allocate.
+        """Allocate; ``held`` are places of particles that stay, (k,).
 
         Raises:
             ValueError: a material with a history, which is not remapped.
         """
-        return Shifter(self, space, particles, flux, moving, conditions, device)
+        return Shifter(self, space, particles, flux, moving, held, device)
 
 
 @functools.cache
@@ -137,7 +135,7 @@ class Shifter:
         particles: Any,
         flux: Flux,
         moving: list[range],
-        conditions: Sequence[Bound],
+        held: np.ndarray,
         device: Any,
     ):
         if any(history is not None for history in flux.histories):
@@ -147,9 +145,7 @@ class Shifter:
         free = np.zeros(n, dtype=np.int32)
         for body in moving:
             free[body.start : body.stop] = 1
-        for condition in conditions:
-            if type(condition).impose is not Bound.impose:
-                free[condition.indices] = 0
+        free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
         self.projection = Projection(space, particles, flux.bodies, device)

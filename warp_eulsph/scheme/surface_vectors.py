@@ -11,11 +11,11 @@ from .dissipation import UpwindForces
 from .flux import Flux
 from .projection import Projection
 from .reference import Configuration
-from .stabiliser import Stabiliser
+from .stabiliser import Correction, Stabiliser
 
 
 @dataclass(frozen=True)
-class SurfaceVectors:
+class SurfaceVectors(Correction):
     """Force correction Q_a (e_a − s_a) (M10): the cheap choice, momentum not exact by itself.
 
     Args:
