@@ -7,6 +7,7 @@ from .lattice import box, nodes
 from .mesh import Patch, mesh
 from .outline import outline
 from .relaxation import Relaxation
+from .repair import Repair
 from .shapes import cylinder, disc, ring, sphere, tube
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Lattice",
     "Patch",
     "Relaxation",
+    "Repair",
     "Staggered",
     "annulus",
     "box",
