@@ -17,6 +17,7 @@ from .failure import failure
 from .looks import Looks
 from .memory import check_memory
 from .order import Order
+from .overlap import Encounters
 from .progress import Bar
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.arrangement import Arrangement, Convected
@@ -94,7 +95,8 @@ class Simulation(Looks):
         surface_given = self.bodies[0].surface is not None
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order, surface_given)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
-        warn(self.bodies, self.particles.share.numpy() == 0.0, box, self.space.real)
+        self.encounters = Encounters(self.bodies, self.particles.share.numpy() == 0.0, box)
+        warn(self.bodies, self.encounters, self.space.real)
         self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
         self.stepper = scheme.build(
             Parts(
@@ -195,6 +197,7 @@ class Simulation(Looks):
                 self.sorting.look_after(self.steps)
         if unstable is not None:
             raise unstable
+        self.encounters.look_now_and_then(self)
 
     # what a checkpoint holds
 
