@@ -15,7 +15,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole"},
+    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
     {"operators"},
     {"scheme", "interactions"},

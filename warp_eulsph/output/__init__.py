@@ -1,5 +1,6 @@
 """What a run leaves on disk and says about itself; the only room that knows HDF5."""
 
+from ..options import explain_mistakes
 from .directory import BusyError, RunDirectory
 from .fields import DEFAULT_FIELDS, FIELDS, TRANSPORT_FIELDS
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
@@ -41,3 +42,5 @@ __all__ = [
     "recover",
     "write_snapshot",
 ]
+
+explain_mistakes(__all__, globals())
