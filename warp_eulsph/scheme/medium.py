@@ -95,10 +95,11 @@ class Medium:
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
             _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
             self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
+        sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            self.pairs = PairPotentials(options.tie, plain, space, self.flux, parts.groups, device)
-        sensed = options.dissipation is not None and options.dissipation.sensor is not None
+            simd = self.configuration.simd and not sensed
+            self.pairs = PairPotentials(options.tie, plain, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
         self.limiter: MassDiffusion | None = None
