@@ -136,7 +136,7 @@ def test_ghosts_stay_out_of_the_books():
     whole = block(2, 12, lambda x: np.c_[8.0 * x[:, 0], -3.0 + 0.0 * x[:, 1]])
     left = whole.x[:, 0] < 0.0
     half = es.Body(x=whole.x[left], volume=whole.volume[0], material=whole.material, velocity=whole.velocity[left])
-    depth = 4 * 1.3 / 12
+    depth = 6 * 1.3 / 12
     half, ghosts = es.mirror(half, point=(0.0, 0.0), normal=(1.0, 0.0), depth=depth)
     simulations = [
         es.Simulation(whole, reference=es.Never(), time_step=es.TimeStep(fixed=1e-4)),

@@ -32,10 +32,9 @@ class Options(NamedTuple):
 
 @dataclass(frozen=True)
 class MediumPlan:
-    """A medium to be: bodies that follow each other, with the same options.
+    """A medium to be: bodies that follow each other, with the same options, whose arrangements all move or all stay.
 
     Attributes:
-        options: the reference is Never() where the arrangement does not move.
         span: numbers of its particles.
     """
 
@@ -50,8 +49,8 @@ class MediumPlan:
 
     @property
     def moves(self) -> bool:
-        """Whether the reference moves."""
-        return not self.options.reference.fixed
+        """Whether its arrangement moves with the reference."""
+        return moves(self.bodies[0], self.options)
 
     @property
     def reach(self) -> float:
@@ -60,8 +59,9 @@ class MediumPlan:
 
     def build(self, space: Space, particles: Any, box: Any, device: Any) -> MediumParts:
         """Allocate; ``particles`` are those of all media."""
-        scheme, policy, given = self.options.scheme, self.options.reference, self.bodies[0].surface is not None
-        own = part(space, particles, "Particles", self.span)
+        scheme, own = self.options.scheme, part(space, particles, "Particles", self.span)
+        policy = self.options.reference if self.moves else Never()
+        given = self.bodies[0].surface is not None
         flux = Flux(space, [(body.material, len(body.x)) for body in self.bodies], own, device)
         configuration = Configuration(
             space,
@@ -69,7 +69,7 @@ class MediumPlan:
             own,
             box,
             device,
-            fixed=policy.fixed,
+            fixed=not self.moves,
             corrected=is_corrected(scheme, policy, given),
             tilt=scheme.tilt,
         )
@@ -94,9 +94,7 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
                 "the simulation"
             )
         together, span = [body], ranges[body.name]
-        if not options.arrangement.moves(body.material):
-            options = options._replace(reference=Never())
-        if media and media[-1].options == options:
+        if media and media[-1].options == options and media[-1].moves == moves(body, options):
             before = media.pop()
             together, span = [*before.bodies, body], range(before.span.start, span.stop)
         media.append(MediumPlan(together, options, span))
@@ -108,6 +106,11 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
                     "same options, and no body with others between them"
                 )
     return media
+
+
+def moves(body: Body, options: Options) -> bool:
+    """Whether the arrangement of a body moves with the reference."""
+    return not options.reference.fixed and options.arrangement.moves(body.material)
 
 
 def options_of(body: Body, defaults: Options) -> Options:
