@@ -38,7 +38,7 @@ def run(monkeypatch, tmp_path):
 
 def test_bar(run):
     figures, frames = run("bar")
-    assert frames == 51
+    assert frames == 26
     # The benchmark's figure for a correct 40-particle Lax-Wendroff scheme is 0.135.
     assert figures["Eulerian: rms displacement error / amplitude"] < 0.14
     assert figures["total Lagrangian: rms displacement error / amplitude"] < 0.14

@@ -15,14 +15,15 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole"},
+    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
     {"operators"},
     {"scheme", "interactions"},
     {"body", "overlap"},
     {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building"},
     {"output"},  # below what it records, of which it knows protocols only
-    {"simulation", "looks", "transport"},
+    {"simulation", "looks", "transport", "programs"},
+    {"settling"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

@@ -70,7 +70,8 @@ FORCES = {
     "correction": Field("vec", "N", "force of the closed pair areas (M10, M11, M12)"),
     "dissipation": Field("vec", "N", "upwind dissipation (M9)"),
     "tie": Field("vec", "N", "force that ties positions to F (M16)"),
-    "external": Field("vec", "N", "body forces, tractions, pressures"),
+    "external": Field("vec", "N", "body forces, tractions, pressures, damping"),
+    "damping": Field("vec", "N", "share of the external forces that damps motion, zero where nothing does"),
     "free_v": Field("vec", "m/s", "velocity at the end of the step before the conditions were imposed"),
     "reaction": Field("vec", "N", "force that the imposed velocities took, mean over the step"),
 }

@@ -10,7 +10,7 @@ from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..building import Options, options_of
 from ..materials import Material
-from ..output import FIELDS, Probe
+from ..output import DEFAULT_FIELDS, FIELDS, Probe
 from ..scheme.arrangement import Arrangement
 from ..scheme.base import Scheme
 from ..scheme.policy import ReferencePolicy
@@ -18,10 +18,10 @@ from ..scheme.time_step import TimeStep
 from ..simulation import Body, Simulation
 from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, choice, one_of
+from .options import Table, choice, one_of, open_choice
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
-from .values import Formula, Number, PlaceFormula
+from .values import Formula, Number, PlaceFormula, ZoneFormula
 
 #: What a body may have of its own.
 OWN = "of this body; that of the case where it is left out"
@@ -40,8 +40,9 @@ class BodyTable(Table):
     """A solid: a shape filled with particles, its material, and how it starts."""
 
     shape: one_of(*SHAPES) = Field(description="a function of warp_eulsph.geometry")  # type: ignore[valid-type]
-    material: choice(Material)  # type: ignore[valid-type]
+    material: open_choice(Material)  # type: ignore[valid-type]
     velocity: PlaceFormula = Field(0.0, validate_default=True, description="initial velocity [m/s]")
+    cut: ZoneFormula | None = Field(None, description="which particles of the shape are left out, such as a notch")
     volume: PlaceFormula | None = Field(None, description="volumes [m^dim] instead of those of the shape")
     spacing: PlaceFormula | None = Field(None, description="spacings [m]; the dim-th root of the volume by default")
     surface: PlaceFormula | None = Field(
@@ -64,6 +65,16 @@ class BodyTable(Table):
         """The body, without ghosts."""
         x, volume, *given = particles(self.shape, f"body.{name}.shape")
         surface = given[0] if given else None
+        if self.cut is not None:
+            if surface is not None:
+                raise ValueError(
+                    f"body.{name}.cut: a shape with area vectors, {self.shape.kind}, would have none on the cut; "
+                    "take another shape, such as box"
+                )
+            kept = ~self.cut.at(x)[:, 0].astype(bool)
+            if not kept.any():
+                raise ValueError(f"body.{name}.cut: leaves nothing of {len(x)} particles")
+            x, volume = x[kept], np.broadcast_to(volume, len(x))[kept]
         return Body(
             x=x,
             volume=volume if self.volume is None else self.volume.at(x)[:, 0],
@@ -85,7 +96,10 @@ class SolidsOutput(OutputTable):
 
     held = FIELDS
 
-    fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
+    fields: list[str] | None = Field(
+        None,
+        description=f"fields of a snapshot, of {', '.join(FIELDS)}; by default {', '.join(DEFAULT_FIELDS)}",
+    )
     body: str | None = Field(None, description="body whose particles are in the snapshots, any by default")
 
 
@@ -96,7 +110,7 @@ class Case(Problem):
     """
 
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
-    boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
+    boundary: list[open_choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]

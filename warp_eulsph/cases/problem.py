@@ -1,10 +1,11 @@
 """What case files of solids and of transported quantities share: numbers, precision, output."""
 
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import warp as wp
-from pydantic import Field, field_validator
+from pydantic import Field, PrivateAttr, field_validator
 
 from ..output import Recording
 from ..output.fields import SnapshotField
@@ -75,6 +76,12 @@ class Problem(Table):
     precision: Precision = Field("double", description="of the simulation")
     device: str | None = Field(None, description="Warp device such as cuda:0; Warp's default otherwise")
     output: OutputTable
+    _programs: tuple[Path, ...] = PrivateAttr(default=())
+
+    @property
+    def programs(self) -> tuple[Path, ...]:
+        """Files beside the case file with materials and conditions that it names."""
+        return self._programs
 
     @property
     def dim(self) -> int:

@@ -81,10 +81,10 @@ def health(simulation: Recorded) -> str:
 def energy_drift(simulation: Simulation) -> float:
     """Energy that loads and conditions do not explain over that which there is, was, or went through them [-].
 
-    What is dissipated counts.
+    What is dissipated counts, but for what ``Damping`` takes.
     """
     energy = simulation.energy()
     start = simulation.stepper.ledger.start
-    gained = energy["total"] - start - energy["external"] - energy["constraint"]
+    gained = energy["total"] - start - energy["external"] - energy["constraint"] - energy["damping"]
     scale = max(abs(energy["total"]), abs(start), abs(energy["external"]), abs(energy["constraint"]), 1e-300)
     return gained / scale

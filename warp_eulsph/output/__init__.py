@@ -1,7 +1,8 @@
 """What a run leaves on disk and says about itself; the only room that knows HDF5."""
 
+from ..options import explain_mistakes
 from .directory import BusyError, RunDirectory
-from .fields import FIELDS, TRANSPORT_FIELDS
+from .fields import DEFAULT_FIELDS, FIELDS, TRANSPORT_FIELDS
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
 from .reader import Comparison, Run, RunFrame, points_on_line
 from .record import ChangedCaseError, Outcome, record
@@ -13,6 +14,7 @@ from .snapshot import Snapshot, read_snapshot, write_snapshot
 from .stopping import Stop
 
 __all__ = [
+    "DEFAULT_FIELDS",
     "FIELDS",
     "TRANSPORT_FIELDS",
     "BodyProbe",
@@ -40,3 +42,5 @@ __all__ = [
     "recover",
     "write_snapshot",
 ]
+
+explain_mistakes(__all__, globals())

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..boundaries import Assembly, Region
+from ..checks import objects
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
 from .fields import known_fields
 from .probes import Probe
@@ -21,7 +22,7 @@ class Recording:
 
     Args:
         snapshots: when a snapshot is written besides the start and the end.
-        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``) in them; all by default.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``) in them; ``DEFAULT_FIELDS`` (or all of these) by default.
         dtype: ``np.float32`` or ``np.float64`` of their reals.
         region: which particles are in them (see ``Region`` of the boundaries), by initial positions or numbers; all by
             default. Their numbers are in the field ``particle``. Log, probes and checkpoints are of all particles.
@@ -45,9 +46,11 @@ class Recording:
     checkpoint: float = 600.0
 
     def __post_init__(self) -> None:
+        if isinstance(self.fields, str):
+            raise ValueError(f"fields must be a list of names, got {self.fields!r}; write [{self.fields!r}]")
         object.__setattr__(self, "fields", known_fields(self.fields))
         object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
-        object.__setattr__(self, "probes", tuple(self.probes))
+        object.__setattr__(self, "probes", tuple(objects(self.probes, Probe, "probes", "BodyProbe(name='whole')")))
         names = [probe.name for probe in self.probes]
         if len(set(names)) < len(names):
             raise ValueError(f"names of probes must differ, got {names}")

@@ -16,12 +16,28 @@ from .medium import Medium
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
+ACCOUNTS = ("external", "constraint", "damping", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool) -> Any:
+def _loads_power(space: Space, damped: bool) -> Any:
+    """``wp.func`` (power of the loads on a particle at velocity v, power of what damps among them) [W]."""
+    Forces, precise = structure(space, "Forces"), vector_type(space.dim, wp.float64)
+
+    @wp.func
+    def loads_power(a: int, forces: Forces, v: precise) -> wp.vec2d:
+        loads, damping = precise(forces.external[a]), wp.float64(0.0)
+        if wp.static(damped):
+            loads -= precise(forces.damping[a])
+            damping = wp.dot(precise(forces.damping[a]), v)
+        return wp.vec2d(wp.dot(loads, v), damping)
+
+    return loads_power
+
+
+@functools.cache
+def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, damped: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
@@ -39,7 +55,7 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
     Flux = structure(space, "Flux")
-    precise = vector_type(space.dim, wp.float64)
+    precise, power_of = vector_type(space.dim, wp.float64), _loads_power(space, damped)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -63,17 +79,14 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
         out: wp.array(dtype=_Entry),
     ):
         block = first + wp.tid()
-        dt = clock.dt[0]
-        total = _Entry()
+        dt, total = clock.dt[0], _Entry()
         for a in range(block * each, wp.min((block + 1) * each, n)):
-            mass = wide(particles.mass[a])
-            v = precise(state.v[a])
+            mass, v, internal = wide(particles.mass[a]), precise(state.v[a]), precise(forces.internal[a])
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
-            internal = precise(forces.internal[a])
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
             strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate)
-            tie = wide(0.0)
+            tie, limiter = wide(0.0), wide(0.0)
             if wp.static(tied):
                 tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
                 strain_power -= tied_power
@@ -84,15 +97,16 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
                 strain_power -= dragged_power
                 dissipation -= dragged_power
             stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
-            limiter = wide(0.0)
             if wp.static(limited):
                 limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
                 stepping -= dW_limited[a]
             if wp.static(smoothed):
                 stepping += mass * wp.dot(precise(dv[a]), v_mean)
+            loads = power_of(a, forces, v_mean)
             total += wide(particles.share[a]) * _Entry(
-                dt * wp.dot(precise(forces.external[a]), v_mean),
+                dt * loads[0],
                 wp.dot(impulse, v_mean),
+                dt * loads[1],
                 dt * dissipation,
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
                 tie,
@@ -213,6 +227,7 @@ class Ledger:
         clock: DeviceClock,
         device: Any,
         exchanges: Exchanges | None = None,
+        damped: bool = False,
     ):
         n = len(particles.mass)
         self.space, self.particles, self.clock, self.device = space, particles, clock, device
@@ -225,7 +240,7 @@ class Ledger:
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self.start, self._most = 0.0, 0.0
-        self._exchanges = exchanges
+        self._exchanges, self._damped = exchanges, damped
 
     def open(self, U: Any) -> None:
         """Start the books at state ``U``."""
@@ -274,7 +289,8 @@ class Ledger:
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
             arguments += [self.clock.fields, medium.forces]
             tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
-            kernel = _make_entries(self.space, tied, dragged, limiter is not None, smoothed is not None)
+            limits, smooths = limiter is not None, smoothed is not None
+            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped)
             self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:

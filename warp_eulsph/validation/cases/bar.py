@@ -77,7 +77,7 @@ def measure(simulation: Simulation, writer: Any = None) -> History:
         u_exact, v_exact = exact(X, simulation.t)
         return {"u": u, "v": v, "u_exact": u_exact, "v_exact": v_exact, "energy": simulation.energy()["total"]}
 
-    return record(simulation, np.linspace(0.0, END_TIME, FRAMES + 1), observe, writer=writer)
+    return record(simulation, np.linspace(0.0, END_TIME, FRAMES + 1), observe, writer=writer, stride=20)
 
 
 def errors(history: History) -> dict[str, float]:

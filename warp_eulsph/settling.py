@@ -1,0 +1,67 @@
+"""Quasi-static answers: steps until loads and stresses balance."""
+
+import logging
+import math
+
+import numpy as np
+
+from .boundaries import Damping
+from .simulation import Simulation
+
+log = logging.getLogger(__name__)
+
+# Steps between two looks at the balance
+STEPS_BETWEEN_LOOKS = 20
+
+
+def residual(simulation: Simulation) -> float:
+    """How far the bodies are from equilibrium [-]: unbalanced forces over loads, or over reactions where nothing loads.
+
+    Σ|f_material + f_load + f_reaction| / Σ|f_load| over the particles in the last step, damping and dissipation, which
+    vanish at rest, left out. Infinite before the first step, and where nothing loads or holds the bodies. Sums of
+    lengths and not of squares, which the few particles of a clamp would rule.
+    """
+    forces = simulation.stepper.forces
+
+    def of(name: str) -> np.ndarray:
+        values: np.ndarray = getattr(forces, name).numpy()
+        return values.astype(float)
+
+    loads, reactions = of("external") - of("damping"), of("reaction")
+    unbalanced = of("internal") + of("correction") + of("tie") + loads + reactions
+    scale = _sum_of_lengths(loads) or _sum_of_lengths(reactions)
+    return _sum_of_lengths(unbalanced) / scale if scale > 0.0 else math.inf
+
+
+def _sum_of_lengths(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).sum())
+
+
+def settle(simulation: Simulation, tolerance: float = 1e-3, *, until: float) -> float:
+    """Step until the bodies are in equilibrium: ``residual(simulation) <= tolerance``; the residual reached.
+
+    Args:
+        simulation: under constant loads and conditions, with a ``Damping`` among them.
+        tolerance: largest residual that counts as equilibrium [-].
+        until: time [s] by which it must be reached.
+
+    Raises:
+        ValueError: no ``Damping`` among the conditions, or a tolerance that is not positive.
+        RuntimeError: no equilibrium by the time ``until``.
+        UnstableError: as ``Simulation.run``.
+    """
+    if not any(isinstance(boundary, Damping) for boundary in simulation.boundaries):
+        raise ValueError("settle needs a Damping() among the boundaries, or motion goes on")
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ValueError(f"tolerance must be positive and finite, got {tolerance}; 1e-3 is usual")
+    found = math.inf
+    while simulation.t < until:
+        simulation.step(STEPS_BETWEEN_LOOKS)
+        found = residual(simulation)
+        if found <= tolerance:
+            log.info("in equilibrium to %.1e at t = %.6g s, step %d", found, simulation.t, simulation.steps)
+            return found
+    raise RuntimeError(
+        f"no equilibrium by t = {simulation.t:.6g} s: residual {found:.2e}, asked for {tolerance}; give it more "
+        "time, or hold the bodies so that none moves freely"
+    )
