@@ -57,6 +57,7 @@ class BodyTable(Table):
     scheme: choice(Scheme, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
     weight: choice(Weight, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
     dilation: Number | None = Field(None, gt=0.0, description=OWN)
+    bonded: str | None = Field(None, description="a body above that it is bonded to, as one solid of two materials")
 
     @property
     def dim(self) -> int:
@@ -90,6 +91,7 @@ class BodyTable(Table):
             scheme=self.scheme.make(),
             weight=self.weight.make(),
             dilation=self.dilation,
+            bonded=self.bonded,
         )
 
 
