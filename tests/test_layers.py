@@ -14,7 +14,19 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "atomics", "simd", "order", "checks", "notices", "whole", "options"},
+    {
+        "space",
+        "linalg",
+        "execution",
+        "atomics",
+        "simd",
+        "order",
+        "checks",
+        "notices",
+        "whole",
+        "options",
+        "kernel_cache",
+    },
     {"fields", "weights", "materials", "boundaries", "reduce", "body", "schedule", "summary", "overlap"},
     {"operators"},
     {"scheme", "contact"},

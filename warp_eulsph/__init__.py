@@ -26,6 +26,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
+from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
     LinearElastic,
@@ -134,4 +135,5 @@ __all__ = [
 ]
 
 explain_mistakes(__all__, globals())
+rebuild_damaged()
 sum_up_compiling()
