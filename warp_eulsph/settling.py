@@ -2,6 +2,7 @@
 
 import logging
 import math
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ log = logging.getLogger(__name__)
 STEPS_BETWEEN_LOOKS = 20
 
 
-def residual(simulation: Simulation) -> float:
+def residual(simulation: Any) -> float:
     """How far the bodies are from equilibrium [-]: unbalanced forces over loads, or over reactions where nothing loads.
 
     Σ|f_material + f_load + f_reaction| / Σ|f_load| over the particles in the last step, damping and dissipation, which
@@ -37,6 +38,18 @@ def _sum_of_lengths(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(vectors, axis=1).sum())
 
 
+def check_damped(simulation: Any) -> None:
+    """Raise ValueError unless a condition damps, without which nothing comes to rest."""
+    if not any(isinstance(boundary, Damping) for boundary in getattr(simulation, "boundaries", ())):
+        raise ValueError("settle needs a Damping() among the boundaries, or motion goes on")
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Raise ValueError unless it can be a residual."""
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ValueError(f"settle: a residual must be positive and finite, got {tolerance}; 1e-3 is usual")
+
+
 def settle(simulation: Simulation, tolerance: float = 1e-3, *, until: float) -> float:
     """Step until the bodies are in equilibrium: ``residual(simulation) <= tolerance``; the residual reached.
 
@@ -50,10 +63,8 @@ def settle(simulation: Simulation, tolerance: float = 1e-3, *, until: float) -> 
         RuntimeError: no equilibrium by the time ``until``.
         UnstableError: as ``Simulation.run``.
     """
-    if not any(isinstance(boundary, Damping) for boundary in simulation.boundaries):
-        raise ValueError("settle needs a Damping() among the boundaries, or motion goes on")
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise ValueError(f"tolerance must be positive and finite, got {tolerance}; 1e-3 is usual")
+    check_damped(simulation)
+    check_tolerance(tolerance)
     found = math.inf
     while simulation.t < until:
         simulation.step(STEPS_BETWEEN_LOOKS)

@@ -115,6 +115,9 @@ class Case(Problem):
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
+    settle: Number | None = Field(
+        None, gt=0.0, description="end when in equilibrium to this residual; needs the condition Damping"
+    )
     sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
     output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     probe: list[choice(Probe)] = Field([], description="what goes to tables of its own; boundary counts from 0")  # type: ignore
@@ -160,14 +163,14 @@ class Case(Problem):
         )
 
     def particular(self, simulation: Simulation) -> dict[str, Any]:
-        """The body whose particles snapshots hold, and probes."""
+        """The body whose particles snapshots hold, probes, and when the run is at rest."""
         probes = []
         for table in self.probe:
             arguments = table.arguments()
             if "boundary" in arguments:
                 arguments["boundary"] = simulation.boundaries[arguments["boundary"]]
             probes.append(table.target(**arguments))
-        return {"body": self.output.body, "probes": probes}
+        return {"body": self.output.body, "probes": probes, "settle": self.settle}
 
     @model_validator(mode="after")
     def _agree(self) -> "Case":
