@@ -9,8 +9,9 @@ import h5py
 import pytest
 
 import warp_eulsph as es
-from warp_eulsph.output import Figure, Run, read_snapshot, table
+from warp_eulsph.output import Run, read_snapshot
 from warp_eulsph.output.description import describe
+from warp_eulsph.validation import Figure, table
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -41,6 +41,7 @@ from .materials import (
 )
 from .notices import sum_up_compiling
 from .operators.values import Linear, Shepard
+from .options import explain_mistakes
 from .order import spatial_order
 from .scheme.arrangement import Arrangement, Convected, Current
 from .scheme.balance import Balance
@@ -140,4 +141,5 @@ __all__ = [
     "spatial_order",
 ]
 
+explain_mistakes(__all__, globals())
 sum_up_compiling()

@@ -2,12 +2,12 @@
 
 import logging
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
-from .boundaries import Damping
-from .simulation import Simulation
+from .boundaries import Boundary, Damping
 
 log = logging.getLogger(__name__)
 
@@ -15,7 +15,28 @@ log = logging.getLogger(__name__)
 STEPS_BETWEEN_LOOKS = 20
 
 
-def residual(simulation: Any) -> float:
+class Damped(Protocol):
+    """What is asked of a simulation."""
+
+    stepper: Any
+
+    @property
+    def boundaries(self) -> Sequence[Boundary]:
+        """Conditions."""
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+
+    def step(self, count: int) -> None:
+        """Take steps."""
+
+
+def residual(simulation: Damped) -> float:
     """How far the bodies are from equilibrium [-]: unbalanced forces over loads, or over reactions where nothing loads.
 
     Σ|f_material + f_load + f_reaction| / Σ|f_load| over the particles in the last step, damping and dissipation, which
@@ -50,7 +71,7 @@ def check_tolerance(tolerance: float) -> None:
         raise ValueError(f"settle: a residual must be positive and finite, got {tolerance}; 1e-3 is usual")
 
 
-def settle(simulation: Simulation, tolerance: float = 1e-3, *, until: float) -> float:
+def settle(simulation: Damped, tolerance: float = 1e-3, *, until: float) -> float:
     """Step until the bodies are in equilibrium: ``residual(simulation) <= tolerance``; the residual reached.
 
     Args:

@@ -1,5 +1,6 @@
 """What a boundary condition declares, and how regions select particles."""
 
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -51,6 +52,7 @@ class Assembly:
         if region is None:
             chosen = np.arange(n)
         elif callable(region):
+            check_takes(region, 1, f"{who}: region", "lambda X: X[:, 0] < 0.1")
             chosen = np.flatnonzero(_mask(region(read_only(self.X)), self.X, who))
         else:
             chosen = _indices(region, n, who)
@@ -71,6 +73,20 @@ def rows_of(indices: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     order = np.argsort(indices)
     rows: np.ndarray = order[np.searchsorted(indices, numbers, sorter=order)]
     return rows
+
+
+def check_takes(function: Any, count: int, who: str, example: str) -> None:
+    """ValueError unless a user's ``function`` takes so many arguments; where Python cannot tell it passes."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(*range(count))
+    except TypeError:
+        raise ValueError(
+            f"{who} must be a function of {count} argument{'s'[: count > 1]} such as {example}, got one of {signature}"
+        ) from None
 
 
 def read_only(values: np.ndarray) -> np.ndarray:

@@ -67,8 +67,9 @@ class Options(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Options":
-        """The class's own checks, so that their message stands beside all others; formulas come to them later."""
-        if isinstance(self.target, type) and not any(isinstance(value, Formula) for _, value in self):
+        """The class's own checks, which stand beside all others; formulas and conditions come later."""
+        later = any(name == "boundary" or isinstance(value, Formula) for name, value in self)
+        if isinstance(self.target, type) and not later:
             self.make()
         return self
 

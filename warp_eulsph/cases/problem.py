@@ -8,7 +8,8 @@ import warp as wp
 from pydantic import Field, PrivateAttr, field_validator
 
 from ..output import Recording
-from ..output.fields import Recorded, SnapshotField
+from ..output.fields import SnapshotField
+from ..output.recorded import Recorded
 from ..schedule import AnyOf, AtTimes, EverySteps, EveryTime, Schedule
 from ..space import Space
 from ..weights import Weight

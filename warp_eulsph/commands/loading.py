@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..output import Recording
-from ..output.fields import Recorded
+from ..output.recorded import Recorded
 from ..programs import program
 
 EXAMPLE = "example:"

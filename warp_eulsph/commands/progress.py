@@ -5,7 +5,7 @@ import sys
 import time
 from typing import Any
 
-from ..output.fields import Recorded
+from ..output.recorded import Recorded
 from ..simulation import Simulation
 
 log = logging.getLogger(__name__)

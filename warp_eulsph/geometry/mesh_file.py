@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import real_number
+
 # Where meshio keeps the number of a cell's group, by format.
 GROUP_KEYS = ("gmsh:physical", "medit:ref", "cell_tags", "obj:group_ids", "patch")
 
@@ -54,7 +56,7 @@ def read_mesh(path: str | PathLike, scale: float = 1.0) -> MeshFile:
         raise ModuleNotFoundError("reading meshes needs meshio: pip install 'warp_eulsph[mesh]'") from None
     if not Path(path).is_file():
         raise FileNotFoundError(f"mesh file not found: {path}")
-    if not (np.isfinite(scale) and scale > 0.0):
+    if not (np.isfinite(real_number(scale, "scale")) and scale > 0.0):
         raise ValueError(f"scale must be positive and finite, got {scale}; 1e-3 is a file in millimetres")
     try:
         mesh = _quietly(meshio.read, path)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import real_number
 from .filling import Filling
 from .lattice import box
 from .relaxation import Relaxation
@@ -44,7 +45,7 @@ class Solid:
         Raises:
             ValueError: a spacing that is not positive, or too coarse for the shape.
         """
-        if not (np.isfinite(spacing) and spacing > 0.0):
+        if not (np.isfinite(real_number(spacing, f"{who}: spacing")) and spacing > 0.0):
             raise ValueError(f"{who}: spacing must be positive and finite, got {spacing} m")
         x, _ = box(self.lower.tolist(), self.upper.tolist(), spacing, filling=filling)
         x = x[self.depth(x)[0] > ON_SURFACE * spacing]

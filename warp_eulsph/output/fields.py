@@ -8,13 +8,9 @@ import warp as wp
 
 from ..fields import PARTICLES, STATE
 from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
-from ..simulation import Simulation
-from ..transport import Transport
+from .recorded import Recorded, solids, transport
 from .stress import stress_array
 from .tensors import first_piola
-
-#: What can be recorded.
-Recorded = Simulation | Transport
 
 
 class SnapshotField(NamedTuple):
@@ -32,7 +28,7 @@ class SnapshotField(NamedTuple):
 
 
 def _positions(simulation: Recorded) -> wp.array:
-    return simulation.stepper.U.x if isinstance(simulation, Simulation) else simulation.configuration.fields.x
+    return simulation.stepper.U.x if solids(simulation) else simulation.configuration.fields.x
 
 
 #: What fields are made of: arrays of the device, by place, to be copied, or of the host, by number, made for it.
@@ -143,7 +139,7 @@ def chosen_fields(names: Iterable[str] | None, simulation: Recorded) -> dict[str
     Raises:
         ValueError: a name that is none of its fields.
     """
-    if isinstance(simulation, Simulation):
+    if not transport(simulation):
         return _chosen(names, FIELDS)
     held = {name: field for name, field in TRANSPORT_FIELDS.items() if name != "exact" or simulation.exact is not None}
     return _chosen(names, held)

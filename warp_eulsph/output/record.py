@@ -15,15 +15,15 @@ import numpy as np
 from ..schedule import next_target
 from ..scheme.health import UnstableError
 from ..settling import check_damped
-from ..transport import Transport
 from .atomic import replace_file
 from .checkpoint import Checkpoint, Checkpoints, take
 from .description import describe, differences, plain
 from .directory import RunDirectory
 from .environment import environment
-from .fields import Recorded, chosen_fields
+from .fields import chosen_fields
 from .log import append, look
 from .probes import Measure
+from .recorded import Recorded, solids
 from .recording import Recording
 from .sealed import DamagedError, read_lines, sealed_line
 from .series import SnapshotWriter
@@ -134,11 +134,11 @@ def record(
 
 def _measures(simulation: Recorded, recording: Recording) -> list[Measure]:
     """What the probes measure."""
-    if isinstance(simulation, Transport):
-        if recording.probes:
-            raise ValueError(f"probes look at solids, got {recording.probes[0].name!r} for a transported quantity")
-        return []
-    return [probe.bind(simulation) for probe in recording.probes]
+    if solids(simulation):
+        return [probe.bind(simulation) for probe in recording.probes]
+    if recording.probes:
+        raise ValueError(f"probes look at solids, got {recording.probes[0].name!r} for a transported quantity")
+    return []
 
 
 def _begin(home: RunDirectory, simulation: Recorded, content: dict[str, Any], *, replace: bool) -> None:

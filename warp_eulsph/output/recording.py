@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..boundaries import Assembly, Region
+from ..checks import objects
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
 from ..settling import STEPS_BETWEEN_LOOKS, check_tolerance, residual
-from .fields import Recorded, known_fields
+from .fields import known_fields
 from .probes import Probe
+from .recorded import Recorded
 from .snapshot import checked_precision
 
 # When it is looked whether the bodies are in equilibrium
@@ -50,9 +52,11 @@ class Recording:
     settle: float | None = None
 
     def __post_init__(self) -> None:
+        if isinstance(self.fields, str):
+            raise ValueError(f"fields must be a list of names, got {self.fields!r}; write [{self.fields!r}]")
         object.__setattr__(self, "fields", known_fields(self.fields))
         object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
-        object.__setattr__(self, "probes", tuple(self.probes))
+        object.__setattr__(self, "probes", tuple(objects(self.probes, Probe, "probes", "BodyProbe(name='whole')")))
         names = [probe.name for probe in self.probes]
         if len(set(names)) < len(names):
             raise ValueError(f"names of probes must differ, got {names}")
@@ -83,4 +87,4 @@ class Recording:
         """Whether this is a step at which the balance is looked at, and the bodies are in equilibrium."""
         if self.settle is None or not BALANCE.due(simulation.t, simulation.steps):
             return False
-        return residual(simulation) <= self.settle
+        return residual(simulation) <= self.settle  # type: ignore[arg-type]

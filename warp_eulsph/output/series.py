@@ -11,8 +11,9 @@ import numpy as np
 from .atomic import replace_file
 from .copies import Copies
 from .directory import RunDirectory
-from .fields import Recorded, known_fields
+from .fields import known_fields
 from .manifest import Manifest, entry_of
+from .recorded import Recorded
 from .snapshot import Frame, checked_precision, collect, encode
 from .temporal import write_index
 

@@ -15,8 +15,9 @@ import warp as wp
 from ..fields import STATE
 from .atomic import replace_file
 from .copies import Copies, Copy
-from .fields import SOURCES, Recorded, SnapshotField, chosen_fields
+from .fields import SOURCES, SnapshotField, chosen_fields
 from .hdf5 import DIGEST, check_layout, digest_of_layout, member, names, opened, read, seal
+from .recorded import Recorded
 from .sealed import DamagedError
 from .tensors import padded
 

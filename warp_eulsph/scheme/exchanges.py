@@ -92,12 +92,12 @@ class Exchanges:
 
     def held(self) -> float:
         """Energy that interactions hold [J]; reads the device."""
-        return sum(exchange.energy() for exchange in self._exchanges)
+        return float(sum(exchange.energy() for exchange in self._exchanges))
 
     def accounts(self) -> list[float]:
         """Energy that each added since the start [J], with what it holds; reads the device.
 
         0 where its forces are those of its energy and steps are short, less where it dissipates.
         """
-        works, start = self._works.numpy().tolist(), self._start.numpy().tolist()
-        return [work + each.energy() - then for each, work, then in zip(self._exchanges, works, start, strict=True)]
+        booked = zip(self._exchanges, self._works.numpy().tolist(), self._start.numpy().tolist(), strict=True)
+        return [work + float(exchange.energy()) - start for exchange, work, start in booked]

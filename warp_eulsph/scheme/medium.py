@@ -93,10 +93,11 @@ class Medium:
                     f"{options.correction}; arrangement=Current() moves all"
                 )
             self.stabiliser = options.correction.build(space, self.particles, self.flux, bodies, device)
+        sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            self.pairs = PairPotentials(options.tie, plain, space, self.flux, device)
-        sensed = options.dissipation is not None and options.dissipation.sensor is not None
+            simd = self.configuration.simd and not sensed
+            self.pairs = PairPotentials(options.tie, plain, simd, space, self.flux, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
         self.limiter: MassDiffusion | None = None

@@ -15,13 +15,13 @@ import numpy as np
 from ..boundaries import Antisymmetry, Wall, mirror
 from ..geometry import box
 from ..materials import LinearElastic
-from ..output import Figure
 from ..output.stress import cauchy_stress
 from ..scheme.arrangement import Current
 from ..scheme.policy import Always, ReferencePolicy
 from ..simulation import Body, Simulation
 from ..weights import CubicSpline
 from .figures import difference, order
+from .report import Figure
 
 DENSITY, YOUNG, POISSON = 1100.0, 17e6, 0.3
 MU, KAPPA = YOUNG / 2 / (1 + POISSON), YOUNG / 3 / (1 - 2 * POISSON)

@@ -8,13 +8,13 @@ import numpy as np
 from ...boundaries import Fixed
 from ...geometry import box
 from ...materials import NeoHookean
-from ...output import Figure
 from ...scheme.arrangement import Convected, Current
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import difference, energy_figures
 from ..history import History, at, record, series
+from ..report import Figure
 from ..solids import RUBBER, MaterialPoint
 
 HEIGHT = 6.0

@@ -7,13 +7,13 @@ import numpy as np
 
 from ...boundaries import Fixed
 from ...geometry import box
-from ...output import Figure
 from ...scheme.arrangement import Current
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import energy_figures, order
 from ..history import History, record, series
+from ..report import Figure
 from ..solids import RUBBER, MaterialPoint
 
 HEIGHT, END_TIME, FRAMES = 6.0, 0.11, 110
