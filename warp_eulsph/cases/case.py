@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..building import Options, options_of
+from ..interactions import Interaction
 from ..materials import Material
 from ..output import DEFAULT_FIELDS, FIELDS, Probe
 from ..scheme.arrangement import Arrangement
@@ -18,7 +19,7 @@ from ..scheme.time_step import TimeStep
 from ..simulation import Body, Simulation
 from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, choice, one_of, open_choice
+from .options import Table, choice, one_of, open_choice, own_choice
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
 from .values import Formula, Number, PlaceFormula, ZoneFormula
@@ -111,6 +112,7 @@ class Case(Problem):
 
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
     boundary: list[open_choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
+    interaction: list[own_choice(Interaction)] = Field([], description="forces between bodies")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
@@ -154,6 +156,7 @@ class Case(Problem):
         return Simulation(
             bodies,
             boundaries=[*conditions, *ghosts],
+            interactions=[interaction.make(space) for interaction in self.interaction],
             time_step=self.time_step.make(),
             **defaults._asdict(),
             periodic=self.periodic,
