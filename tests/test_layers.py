@@ -21,10 +21,9 @@ LAYERS = [
     {"operators"},
     {"scheme", "interactions"},
     {"body", "overlap"},
-    {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building"},
+    {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building", "settling"},
     {"output"},  # below what it records, of which it knows protocols only
     {"simulation", "looks", "transport", "programs"},
-    {"settling"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},
