@@ -32,7 +32,7 @@ class Options(NamedTuple):
 
 @dataclass(frozen=True)
 class MediumPlan:
-    """A medium to be: bodies that follow each other, with the same options.
+    """A medium to be: bodies that follow each other, with the same options, whose arrangements all move or all stay.
 
     Attributes:
         span: numbers of its particles.
@@ -48,15 +48,9 @@ class MediumPlan:
         return len(self.span)
 
     @property
-    def moving(self) -> list[bool]:
-        """Whether the arrangement of each body moves with the reference."""
-        reference, arrangement = self.options.reference, self.options.arrangement
-        return [not reference.fixed and arrangement.moves(body.material) for body in self.bodies]
-
-    @property
     def moves(self) -> bool:
-        """Whether any of them does."""
-        return any(self.moving)
+        """Whether its arrangement moves with the reference."""
+        return moves(self.bodies[0], self.options)
 
     @property
     def reach(self) -> float:
@@ -65,7 +59,7 @@ class MediumPlan:
 
     def build(self, space: Space, particles: Any, box: Any, device: Any) -> MediumParts:
         """Allocate; ``particles`` are those of all media."""
-        scheme, moving, own = self.options.scheme, self.moving, part(space, particles, "Particles", self.span)
+        scheme, own = self.options.scheme, part(space, particles, "Particles", self.span)
         policy = self.options.reference if self.moves else Never()
         given = self.bodies[0].surface is not None
         flux = Flux(space, [(body.material, len(body.x)) for body in self.bodies], own, device)
@@ -75,11 +69,11 @@ class MediumPlan:
             own,
             box,
             device,
-            moving=[body for body, moves in zip(flux.bodies, moving, strict=True) if moves],
+            fixed=not self.moves,
             corrected=is_corrected(scheme, policy, given),
             tilt=scheme.tilt,
         )
-        return MediumParts(scheme, policy, self.span, own, flux, configuration, moving, given)
+        return MediumParts(scheme, policy, self.span, own, flux, configuration, given)
 
 
 def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
@@ -100,11 +94,16 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
                 "the simulation"
             )
         together, span = [body], ranges[body.name]
-        if media and media[-1].options == options and media[-1].moves == MediumPlan([body], options, span).moves:
+        if media and media[-1].options == options and media[-1].moves == moves(body, options):
             before = media.pop()
             together, span = [*before.bodies, body], range(before.span.start, span.stop)
         media.append(MediumPlan(together, options, span))
     return media
+
+
+def moves(body: Body, options: Options) -> bool:
+    """Whether the arrangement of a body moves with the reference."""
+    return not options.reference.fixed and options.arrangement.moves(body.material)
 
 
 def options_of(body: Body, defaults: Options) -> Options:

@@ -32,7 +32,9 @@ class MirrorPlane(Table):
 
     point: list[Number] = Field(description="a point of the plane [m], (dim,)")
     normal: list[Number] = Field(description="normal of the plane, out of the body, (dim,)")
-    depth: Number | None = Field(None, description="particles this near get a ghost [m]; two support radii by default")
+    depth: Number | None = Field(
+        None, description="particles this near get a ghost [m]; three support radii by default"
+    )
     image: choice(Image) = Field("Wall", validate_default=True, description="Wall, or Antisymmetry for a linear law")  # type: ignore[valid-type]
 
 
@@ -141,7 +143,7 @@ class Case(Problem):
                 depth = plane.depth
                 if depth is None:
                     own = options_of(body, defaults)
-                    depth = 2.0 * own.weight.support * own.dilation * float(body.spacing.max())
+                    depth = 3.0 * own.weight.support * own.dilation * float(body.spacing.max())
                 body, condition = mirror(
                     body, point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()
                 )

@@ -36,7 +36,6 @@ class MediumParts:
         particles: struct ``Particles`` of them.
         flux: of its bodies.
         configuration: its reference k.
-        moving: whether the arrangement of each of its bodies moves with the reference.
         surface_given: the bodies came with their area vectors.
     """
 
@@ -46,7 +45,6 @@ class MediumParts:
     particles: Any
     flux: Flux
     configuration: Configuration
-    moving: Sequence[bool]
     surface_given: bool
 
 
@@ -75,24 +73,18 @@ class Medium:
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
-        options, n, moving = self.options, self.n, list(parts.moving)
-        bodies = [body for body, moves in zip(self.flux.bodies, moving, strict=True) if moves]
+        options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
             held = _held(conditions, self.span)
-            self.shifter = options.shifting.build(space, self.particles, self.flux, bodies, held, device)
+            self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
         self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
-            if 0 < len(bodies) < len(moving) and not options.correction.by_body:
-                raise ValueError(
-                    f"correction must be Balance() or None where some bodies move and others do not, got "
-                    f"{options.correction}; arrangement=Current() moves all"
-                )
-            self.stabiliser = options.correction.build(space, self.particles, self.flux, bodies, device)
+            self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):

@@ -42,7 +42,7 @@ class PairAreas(Correction):
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "ClosedPairs":
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "ClosedPairs":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return ClosedPairs(self, space, particles, flux.bodies, device)
 

@@ -223,7 +223,8 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], reference.x[a], near.box)
-            now = separation(x[b], x[a], near.box)
+            # by displacements: in a periodic box the nearest image of a strained pair may be another
+            now = xi + ((x[b] - reference.x[b]) - (x[a] - reference.x[a]))
             pull = (now - (F[a] + F[b]) @ (xi * real(0.5))) * (modulus * near.w[k])
             tie += pull
             tied += wp.outer(pull, xi)

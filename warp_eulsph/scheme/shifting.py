@@ -46,15 +46,13 @@ class Shifting:
                 f"shifting bound must be in (0, 0.25] spacings, got {self.bound}; 0.05 is the tested value"
             )
 
-    def build(
-        self, space: Space, particles: Any, flux: Flux, moving: list[range], held: np.ndarray, device: Any
-    ) -> "Shifter":
+    def build(self, space: Space, particles: Any, flux: Flux, held: np.ndarray, device: Any) -> "Shifter":
         """Allocate; ``held`` are places of particles that stay, (k,).
 
         Raises:
             ValueError: a material with a history, which is not remapped.
         """
-        return Shifter(self, space, particles, flux, moving, held, device)
+        return Shifter(self, space, particles, flux, held, device)
 
 
 @functools.cache
@@ -136,7 +134,6 @@ class Shifter:
         space: Space,
         particles: Any,
         flux: Flux,
-        moving: list[range],
         held: np.ndarray,
         device: Any,
     ):
@@ -144,9 +141,7 @@ class Shifter:
             raise ValueError("shifting cannot remap the history of a material; use shifting=None")
         self.option, self.space, self.particles, self.device = option, space, particles, device
         n, self._launch = len(particles.mass), Launcher(device)
-        free = np.zeros(n, dtype=np.int32)
-        for body in moving:
-            free[body.start : body.stop] = 1
+        free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
