@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import warp_eulsph as es
+from warp_eulsph.interactions import BoundInteraction
 
 Path(__file__).with_suffix(".ran").touch()
 
@@ -41,6 +42,27 @@ class Wind(es.Boundary):
 
     def bind(self, assembly):
         return es.BodyForce([self.strength] + [0.0] * (assembly.space.dim - 1)).bind(assembly)
+
+
+@dataclass(frozen=True)
+class Attraction(es.Interaction):
+    """All of the first half of the particles is drawn along x, and the other half back."""
+
+    strength: float
+
+    def bind(self, assembly):
+        return BoundAttraction(self, assembly)
+
+
+class BoundAttraction(BoundInteraction):
+    def __init__(self, option, assembly):
+        self.strength, self.indices = option.strength, assembly.select(None, None, "Attraction")
+
+    def forces(self, world, state, fraction, out):
+        n, forces = len(self.indices), out.numpy()
+        forces[: n // 2, 0] += self.strength
+        forces[n // 2 :, 0] -= self.strength
+        out.assign(forces)
 
 
 @dataclass(frozen=True)
@@ -143,3 +165,18 @@ def test_other_places_take_no_programs(folder, kind):
         with pytest.raises(CaseError, match="unknown kind"):
             parse_case(small(**changes), directory=folder, trust=True)
     assert not ran(folder) and issubclass(es.Fixed, es.Boundary)
+
+
+def test_forces_between_bodies_are_named_too(folder):
+    case = small(interaction=[{"kind": "own_things:Attraction", "strength": 5.0}])
+    simulation = parse_case(case, directory=folder, trust=True).build()
+    simulation.step()
+    v = simulation.v[:, 0]
+    assert v[:8].sum() > 0.0 > v[8:].sum() and abs(simulation.momentum()[0]) < 1e-12
+    described = parse_case(case, directory=folder, trust=True).describe()
+    assert described["interaction"] == case["interaction"]
+    jsonschema.validate(json.loads(json.dumps(described)), json_schema())
+    with pytest.raises(CaseError, match=r"interaction\.0: 'own_things:Attraction' is a program"):
+        parse_case(case, directory=folder)
+    with pytest.raises(CaseError, match=r"interaction.0: kind must name a class below Interaction .*, got 'Springs'"):
+        parse_case(small(interaction=["Springs"]), directory=folder, trust=True)

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 import warp as wp
+from case_files import small
+from kept_runs import StopAfter
 from test_resume import bits
 
 import warp_eulsph as es
 from warp_eulsph import execution
+from warp_eulsph.cases import CaseError, parse_case
 from warp_eulsph.geometry import box
+from warp_eulsph.output import Run, record
 from warp_eulsph.output.checkpoint import take
 from warp_eulsph.settling import residual
 
@@ -179,9 +183,39 @@ def test_without_it_its_account_is_empty_and_nothing_settles():
 def test_mistakes_are_named():
     with pytest.raises(ValueError, match="rate must be positive and finite, got 0"):
         es.Damping(rate=0.0)
-    with pytest.raises(ValueError, match="tolerance must be positive and finite, got 0"):
+    with pytest.raises(ValueError, match="a residual must be positive and finite, got 0"):
         es.settle(kept_block(), 0.0, until=1.0)
     simulation = kept_block()
     with pytest.raises(RuntimeError, match=r"no equilibrium by t = .*: residual .*, asked for 1e-09"):
         es.settle(simulation, 1e-9, until=0.01)
     assert residual(es.Simulation(simulation.bodies, boundaries=[es.Damping()])) == np.inf
+
+
+def settling_case(**changes):
+    case = small(settle=1e-3, until=5.0, boundary=["Gravity", {"kind": "Fixed", "region": "y < 0.25"}, "Damping"])
+    return {**case, **changes}
+
+
+def test_runs_end_in_equilibrium_stopped_on_the_way_or_not(tmp_path):
+    """By a case file: the last frame is the state at rest, the same one after a stop between two looks."""
+    case = parse_case(settling_case())
+    for name, stops in (("whole", ()), ("stopped", (33, 50))):
+        stop = StopAfter(*stops)
+        for _ in range(len(stops) + 1):
+            simulation = case.build()
+            options = {"resume": True, "stop": stop, "watch": stop.watch}
+            record(simulation, tmp_path / name, case.until, case.recording(simulation), **options)
+        assert residual(simulation) <= 1e-3 and simulation.t < 1.0 and simulation.steps % 20 == 0
+        assert Run(tmp_path / name).state == "done"
+    whole, stopped = Run(tmp_path / "whole"), Run(tmp_path / "stopped")
+    assert whole[-1].step == stopped[-1].step == simulation.steps > 50
+    np.testing.assert_array_equal(whole[-1].x, stopped[-1].x)
+
+
+def test_runs_that_never_come_to_rest_are_refused(tmp_path):
+    case = parse_case(settling_case(boundary=["Gravity"]))
+    simulation = case.build()
+    with pytest.raises(ValueError, match="settle needs a Damping"):
+        record(simulation, tmp_path / "run", case.until, case.recording(simulation))
+    with pytest.raises(CaseError, match="settle: input should be greater than 0"):
+        parse_case(settling_case(settle=0.0))

@@ -15,15 +15,15 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"},
+    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"}
+    | {"kernel_cache"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
     {"operators"},
     {"scheme", "interactions"},
     {"body", "overlap"},
-    {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building"},
+    {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building", "settling"},
     {"output"},  # below what it records, of which it knows protocols only
     {"simulation", "looks", "transport", "programs"},
-    {"settling"},
     {"validation", "pictures", "bench"},
     {"cases"},
     {"commands", "cli", "__main__"},

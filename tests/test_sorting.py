@@ -209,7 +209,7 @@ def test_conditions_that_do_not_say_so_keep_particles_where_they_are(caplog):
     order = np.random.default_rng(0).permutation(64)
     with caplog.at_level(logging.INFO, logger="warp_eulsph.sorting"):
         simulation = two_blocks(order=order, conditions=[Shaken()])
-    assert "not sorted in memory: a condition does not say that it is sortable" in caplog.text
+    assert "not sorted in memory: a condition or interaction does not say that it is sortable" in caplog.text
     assert simulation.sorting.parted() > 0.4 and np.array_equal(simulation.order.places, np.arange(128))
     plain = two_blocks(conditions=[Shaken()])
     simulation.step(5)

@@ -2,11 +2,12 @@
 
 import logging
 import math
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
-from .boundaries import Damping
-from .simulation import Simulation
+from .boundaries import Boundary, Damping
 
 log = logging.getLogger(__name__)
 
@@ -14,7 +15,28 @@ log = logging.getLogger(__name__)
 STEPS_BETWEEN_LOOKS = 20
 
 
-def residual(simulation: Simulation) -> float:
+class Damped(Protocol):
+    """What is asked of a simulation."""
+
+    stepper: Any
+
+    @property
+    def boundaries(self) -> Sequence[Boundary]:
+        """Conditions."""
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+
+    def step(self, count: int) -> None:
+        """Take steps."""
+
+
+def residual(simulation: Damped) -> float:
     """How far the bodies are from equilibrium [-]: unbalanced forces over loads, or over reactions where nothing loads.
 
     Σ|f_material + f_load + f_reaction| / Σ|f_load| over the particles in the last step, damping and dissipation, which
@@ -37,7 +59,19 @@ def _sum_of_lengths(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(vectors, axis=1).sum())
 
 
-def settle(simulation: Simulation, tolerance: float = 1e-3, *, until: float) -> float:
+def check_damped(simulation: Any) -> None:
+    """Raise ValueError unless a condition damps, without which nothing comes to rest."""
+    if not any(isinstance(boundary, Damping) for boundary in getattr(simulation, "boundaries", ())):
+        raise ValueError("settle needs a Damping() among the boundaries, or motion goes on")
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Raise ValueError unless it can be a residual."""
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ValueError(f"settle: a residual must be positive and finite, got {tolerance}; 1e-3 is usual")
+
+
+def settle(simulation: Damped, tolerance: float = 1e-3, *, until: float) -> float:
     """Step until the bodies are in equilibrium: ``residual(simulation) <= tolerance``; the residual reached.
 
     Args:
@@ -50,10 +84,8 @@ def settle(simulation: Simulation, tolerance: float = 1e-3, *, until: float) -> 
         RuntimeError: no equilibrium by the time ``until``.
         UnstableError: as ``Simulation.run``.
     """
-    if not any(isinstance(boundary, Damping) for boundary in simulation.boundaries):
-        raise ValueError("settle needs a Damping() among the boundaries, or motion goes on")
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise ValueError(f"tolerance must be positive and finite, got {tolerance}; 1e-3 is usual")
+    check_damped(simulation)
+    check_tolerance(tolerance)
     found = math.inf
     while simulation.t < until:
         simulation.step(STEPS_BETWEEN_LOOKS)

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..building import Options, options_of
+from ..interactions import Interaction
 from ..materials import Material
 from ..output import DEFAULT_FIELDS, FIELDS, Probe
 from ..scheme.arrangement import Arrangement
@@ -18,7 +19,7 @@ from ..scheme.time_step import TimeStep
 from ..simulation import Body, Simulation
 from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, choice, one_of, open_choice
+from .options import Table, choice, one_of, open_choice, own_choice
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
 from .values import Formula, Number, PlaceFormula, ZoneFormula
@@ -57,6 +58,7 @@ class BodyTable(Table):
     scheme: choice(Scheme, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
     weight: choice(Weight, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
     dilation: Number | None = Field(None, gt=0.0, description=OWN)
+    bonded: str | None = Field(None, description="a body above that it is bonded to, as one solid of two materials")
 
     @property
     def dim(self) -> int:
@@ -90,6 +92,7 @@ class BodyTable(Table):
             scheme=self.scheme.make(),
             weight=self.weight.make(),
             dilation=self.dilation,
+            bonded=self.bonded,
         )
 
 
@@ -113,10 +116,14 @@ class Case(Problem):
 
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
     boundary: list[open_choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
+    interaction: list[own_choice(Interaction)] = Field([], description="forces between bodies")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
+    settle: Number | None = Field(
+        None, gt=0.0, description="end when in equilibrium to this residual; needs the condition Damping"
+    )
     sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
     output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     probe: list[choice(Probe)] = Field([], description="what goes to tables of its own; boundary counts from 0")  # type: ignore
@@ -153,6 +160,7 @@ class Case(Problem):
         return Simulation(
             bodies,
             boundaries=[*conditions, *ghosts],
+            interactions=[interaction.make(space) for interaction in self.interaction],
             time_step=self.time_step.make(),
             **defaults._asdict(),
             periodic=self.periodic,
@@ -162,14 +170,14 @@ class Case(Problem):
         )
 
     def particular(self, simulation: Simulation) -> dict[str, Any]:
-        """The body whose particles snapshots hold, and probes."""
+        """The body whose particles snapshots hold, probes, and when the run is at rest."""
         probes = []
         for table in self.probe:
             arguments = table.arguments()
             if "boundary" in arguments:
                 arguments["boundary"] = simulation.boundaries[arguments["boundary"]]
             probes.append(table.target(**arguments))
-        return {"body": self.output.body, "probes": probes}
+        return {"body": self.output.body, "probes": probes, "settle": self.settle}
 
     @model_validator(mode="after")
     def _agree(self) -> "Case":

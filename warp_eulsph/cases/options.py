@@ -191,6 +191,12 @@ def open_choice(base: type) -> Any:
 
 
 @functools.cache
+def own_choice(base: type) -> Any:
+    """A class of the user's own below ``base``, of which the package has none."""
+    return Annotated[Options, _Own(base, alone=True)]
+
+
+@functools.cache
 def one_of(*targets: Callable[..., Any], optional: bool = False) -> Any:
     """One of these classes or functions."""
     if len(targets) == 1 and not optional:
@@ -227,10 +233,15 @@ class _Own:
     """Lets a class of the user's own below ``base`` stand there, by its module and name, in files that are trusted."""
 
     base: type
+    alone: bool = False
 
     def _validate(self, given: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
         kind = given.get("kind") if isinstance(given, dict) else given
+        if isinstance(given, Options):
+            return given
         if not (isinstance(kind, str) and re.fullmatch(OWN_KIND, kind)):
+            if self.alone:
+                raise ValueError(f"kind must name a class below {self.base.__name__} as 'module:Class', got {kind!r}")
             return handler(given)
         table = self._table(kind, reading(info))
         return table.model_validate(given if isinstance(given, dict) else {"kind": kind}, context=info.context)
@@ -263,7 +274,7 @@ class _Own:
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> Any:
         kind = {"type": "string", "pattern": f"^{OWN_KIND}$", "description": f"{self.base.__name__} of your own"}
         table = {"type": "object", "properties": {"kind": kind}, "required": ["kind"]}
-        return {"anyOf": [handler(schema), kind, table]}
+        return {"anyOf": [kind, table] if self.alone else [handler(schema), kind, table]}
 
 
 def concrete(base: type) -> list[type]:

@@ -10,10 +10,14 @@ import numpy as np
 from ..boundaries import Assembly, Region
 from ..checks import objects
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
+from ..settling import STEPS_BETWEEN_LOOKS, check_tolerance, residual
 from .fields import known_fields
 from .probes import Probe
 from .recorded import Recorded
 from .snapshot import checked_precision
+
+# When it is looked whether the bodies are in equilibrium
+BALANCE = EverySteps(STEPS_BETWEEN_LOOKS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +35,7 @@ class Recording:
             between two looks at it, so that other numbers of steps cost time there.
         probes: what goes to tables of its own.
         checkpoint: wall time between checkpoints [s]; one is written at the start, at the end and at a stop, too.
+        settle: residual at which bodies count as in equilibrium (see ``settle``), which ends the run; None runs on.
 
     Raises:
         ValueError: unknown fields or dtype, probes of equal names, a wall time that is not positive.
@@ -44,6 +49,7 @@ class Recording:
     log: Schedule = EverySteps(16)
     probes: Sequence[Probe] = ()
     checkpoint: float = 600.0
+    settle: float | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.fields, str):
@@ -56,6 +62,8 @@ class Recording:
             raise ValueError(f"names of probes must differ, got {names}")
         if math.isnan(self.checkpoint) or self.checkpoint <= 0.0:
             raise ValueError(f"checkpoint must be a positive wall time [s], got {self.checkpoint}; 600 is 10 minutes")
+        if self.settle is not None:
+            check_tolerance(self.settle)
 
     def particles(self, simulation: Recorded) -> np.ndarray | None:
         """Numbers of the particles that snapshots hold, (k,) int32, ascending; None if all.
@@ -72,4 +80,11 @@ class Recording:
     @property
     def schedule(self) -> Schedule:
         """When anything is due."""
-        return AnyOf([self.snapshots, self.log, *(probe.schedule for probe in self.probes)])
+        looks = [] if self.settle is None else [BALANCE]
+        return AnyOf([self.snapshots, self.log, *(probe.schedule for probe in self.probes), *looks])
+
+    def settled(self, simulation: Recorded) -> bool:
+        """Whether this is a step at which the balance is looked at, and the bodies are in equilibrium."""
+        if self.settle is None or not BALANCE.due(simulation.t, simulation.steps):
+            return False
+        return residual(simulation) <= self.settle  # type: ignore[arg-type]
