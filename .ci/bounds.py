@@ -10,7 +10,8 @@ except ModuleNotFoundError:  # Python 3.10
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
+OF_USERS = [requirement for extra in EXTRAS if extra not in ("all", "docs", "test") for requirement in EXTRAS[extra]]
 
-for requirement in [*PROJECT["dependencies"], *EXTRAS["viz"], *EXTRAS["mesh"], *EXTRAS["xarray"]]:
+for requirement in [*PROJECT["dependencies"], *OF_USERS]:
     name, version, marker = re.fullmatch(r"([\w-]+)>=([\w.]+)(?:; (.*))?", requirement).groups()
     print(f"{name}=={version}" + (f"; {marker}" if marker else ""))

@@ -24,7 +24,7 @@ def attempt(path: str) -> str:
     from warp_eulsph.geometry import Repair, mesh, outline
 
     repairs = {"": None, "close": Repair(close=True), "turn": Repair(turn=True)}
-    repairs |= {"turn and close": Repair(turn=True, close=True)}
+    repairs |= {"turn and close": Repair(turn=True, close=True), "take": Repair(turn=True, take=True)}
     message = ""
     for words, repair in repairs.items():
         if repair is not None and "repair=" not in message:

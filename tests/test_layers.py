@@ -15,7 +15,8 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
-    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"},
+    {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"}
+    | {"kernel_cache"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
     {"operators"},
     {"scheme", "interactions"},

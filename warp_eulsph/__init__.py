@@ -28,6 +28,7 @@ from .boundaries import (
     mirror,
 )
 from .interactions import Interaction
+from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
     LinearElastic,
@@ -142,4 +143,5 @@ __all__ = [
 ]
 
 explain_mistakes(__all__, globals())
+rebuild_damaged()
 sum_up_compiling()

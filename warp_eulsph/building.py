@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .body import Body
+from .body import Body, groups_of
 from .failure import place_of
 from .fields import allocate, part
 from .scheme.arrangement import Arrangement
@@ -32,9 +32,10 @@ class Options(NamedTuple):
 
 @dataclass(frozen=True)
 class MediumPlan:
-    """A medium to be: bodies that follow each other, with the same options, whose arrangements all move or all stay.
+    """A medium to be: bodies that follow each other, with the same options.
 
     Attributes:
+        options: the reference is Never() where the arrangement does not move.
         span: numbers of its particles.
     """
 
@@ -49,8 +50,8 @@ class MediumPlan:
 
     @property
     def moves(self) -> bool:
-        """Whether its arrangement moves with the reference."""
-        return moves(self.bodies[0], self.options)
+        """Whether the reference moves."""
+        return not self.options.reference.fixed
 
     @property
     def reach(self) -> float:
@@ -59,9 +60,8 @@ class MediumPlan:
 
     def build(self, space: Space, particles: Any, box: Any, device: Any) -> MediumParts:
         """Allocate; ``particles`` are those of all media."""
-        scheme, own = self.options.scheme, part(space, particles, "Particles", self.span)
-        policy = self.options.reference if self.moves else Never()
-        given = self.bodies[0].surface is not None
+        scheme, policy, given = self.options.scheme, self.options.reference, self.bodies[0].surface is not None
+        own = part(space, particles, "Particles", self.span)
         flux = Flux(space, [(body.material, len(body.x)) for body in self.bodies], own, device)
         configuration = Configuration(
             space,
@@ -69,11 +69,11 @@ class MediumPlan:
             own,
             box,
             device,
-            fixed=not self.moves,
+            fixed=policy.fixed,
             corrected=is_corrected(scheme, policy, given),
             tilt=scheme.tilt,
         )
-        return MediumParts(scheme, policy, self.span, own, flux, configuration, given)
+        return MediumParts(scheme, policy, self.span, own, flux, configuration, given, groups_of(self.bodies))
 
 
 def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
@@ -94,16 +94,20 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
                 "the simulation"
             )
         together, span = [body], ranges[body.name]
-        if media and media[-1].options == options and media[-1].moves == moves(body, options):
+        if not options.arrangement.moves(body.material):
+            options = options._replace(reference=Never())
+        if media and media[-1].options == options:
             before = media.pop()
             together, span = [*before.bodies, body], range(before.span.start, span.stop)
         media.append(MediumPlan(together, options, span))
+    for medium in media:
+        for body in medium.bodies:
+            if body.bonded not in (None, *(other.name for other in medium.bodies)):
+                raise ValueError(
+                    f"bodies {body.bonded!r} and {body.name!r} are bonded and must be of one medium; give them the "
+                    "same options, and no body with others between them"
+                )
     return media
-
-
-def moves(body: Body, options: Options) -> bool:
-    """Whether the arrangement of a body moves with the reference."""
-    return not options.reference.fixed and options.arrangement.moves(body.material)
 
 
 def options_of(body: Body, defaults: Options) -> Options:
@@ -132,6 +136,7 @@ def make_particles(space: Space, media: Sequence[MediumPlan], device: Any) -> An
     particles.spacing.assign(spacing)
     particles.share.fill_(1.0)
     particles.body.assign(np.repeat(np.arange(len(counts)), counts))
+    particles.group.assign(np.repeat(groups_of(bodies), counts))
     return particles
 
 

@@ -28,7 +28,8 @@ PARTICLES = {
     "h": Field("real", "m", "initial smoothing length, dilation times spacing"),
     "spacing": Field("real", "m", "initial particle spacing"),
     "share": Field("real", "-", "1; 0 for ghosts, which energies and momenta leave out"),
-    "body": Field("int", "-", "number of the body; only particles of one body are neighbours"),
+    "body": Field("int", "-", "number of the body"),
+    "group": Field("int", "-", "number of what is bonded together; only particles of one are neighbours"),
 }
 STATE = {
     "x": Field("vec", "m", "position"),

@@ -28,6 +28,27 @@ class Looks:
     stepper: Any
     particles: Any
 
+    if TYPE_CHECKING:
+
+        @property
+        def t(self) -> float: ...
+
+        @property
+        def dt(self) -> float: ...
+
+        @property
+        def steps(self) -> int: ...
+
+        @property
+        def x(self) -> np.ndarray: ...
+
+        @property
+        def F(self) -> np.ndarray: ...
+
+        def extrema(self) -> dict[str, float]: ...
+
+        def energy(self) -> dict[str, float]: ...
+
     @property
     def X(self) -> np.ndarray:
         """Initial positions [m], (n, dim)."""

@@ -33,7 +33,9 @@ class MirrorPlane(Table):
 
     point: list[Number] = Field(description="a point of the plane [m], (dim,)")
     normal: list[Number] = Field(description="normal of the plane, out of the body, (dim,)")
-    depth: Number | None = Field(None, description="particles this near get a ghost [m]; two support radii by default")
+    depth: Number | None = Field(
+        None, description="particles this near get a ghost [m]; three support radii by default"
+    )
     image: choice(Image) = Field("Wall", validate_default=True, description="Wall, or Antisymmetry for a linear law")  # type: ignore[valid-type]
 
 
@@ -56,6 +58,7 @@ class BodyTable(Table):
     scheme: choice(Scheme, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
     weight: choice(Weight, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
     dilation: Number | None = Field(None, gt=0.0, description=OWN)
+    bonded: str | None = Field(None, description="a body above that it is bonded to, as one solid of two materials")
 
     @property
     def dim(self) -> int:
@@ -89,6 +92,7 @@ class BodyTable(Table):
             scheme=self.scheme.make(),
             weight=self.weight.make(),
             dilation=self.dilation,
+            bonded=self.bonded,
         )
 
 
@@ -146,7 +150,7 @@ class Case(Problem):
                 depth = plane.depth
                 if depth is None:
                     own = options_of(body, defaults)
-                    depth = 2.0 * own.weight.support * own.dilation * float(body.spacing.max())
+                    depth = 3.0 * own.weight.support * own.dilation * float(body.spacing.max())
                 body, condition = mirror(
                     body, point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()
                 )

@@ -330,7 +330,7 @@ def _zone_kind(given: Any) -> str:
 
 
 #: Which particles: a comparison of their initial positions, or near a patch of a mesh.
-Zone = Annotated[
+Zone = Annotated[  # type: ignore[valid-type]
     Annotated[ZoneFormula, Tag("formula")] | Annotated[table_of(Patch, sole=True), Tag("patch")],  # type: ignore
     Discriminator(_zone_kind),
 ]

@@ -35,7 +35,9 @@ class OutputTable(Table):
     steps: Whole | None = Field(None, gt=0, description="steps between snapshots")
     at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
     precision: Precision = Field("single", description="of the stored numbers")
-    region: Zone | None = Field(None, description="particles in the snapshots, by initial positions; all by default")
+    region: Zone | None = Field(  # type: ignore[valid-type]
+        None, description="particles in the snapshots, by initial positions; all by default"
+    )
     log: choice(Schedule) = Field({"kind": "EverySteps", "count": 16}, validate_default=True)  # type: ignore[valid-type]
     checkpoint: Number = Field(600.0, gt=0.0, description="wall time between checkpoints [s]")
 

@@ -49,4 +49,4 @@ def _note_files(parser: argparse.ArgumentParser) -> None:
             for below in action.choices.values():
                 _note_files(below)
         elif action.metavar in KINDS:
-            action.complete = KINDS[action.metavar]  # type: ignore[index]
+            action.complete = KINDS[action.metavar]  # type: ignore[index,attr-defined]

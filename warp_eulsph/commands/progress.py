@@ -5,7 +5,7 @@ import sys
 import time
 from typing import Any
 
-from ..output.recorded import Recorded
+from ..output.recorded import Recorded, transport
 from ..simulation import Simulation
 
 log = logging.getLogger(__name__)
@@ -74,8 +74,8 @@ def health(simulation: Recorded) -> str:
     """The figure that tells soonest that a run goes wrong."""
     if isinstance(simulation, Simulation):
         return f"energy drift {energy_drift(simulation):+.1e}"
-    amounts = simulation.amounts()
-    return f"values {amounts['least']:.3g} to {amounts['largest']:.3g}"
+    amounts = simulation.amounts() if transport(simulation) else {}
+    return f"values {amounts['least']:.3g} to {amounts['largest']:.3g}" if amounts else ""
 
 
 def energy_drift(simulation: Simulation) -> float:

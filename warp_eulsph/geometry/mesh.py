@@ -34,7 +34,8 @@ def mesh(
         scale: length of the file's unit [m], 1e-3 for millimetres.
         filling: Lattice(), BodyCentred() or Staggered(), cut to the shape.
         relaxation: Relaxation() to make them even and fit the surface; None leaves the cut filling.
-        repair: what may be mended where the surface is not closed: Repair(weld=…, close=…, turn=…).
+        repair: what may be mended where the surface is not closed: Repair(weld=…, close=…, turn=…), or that it
+            is to be taken as it is, Repair(take=True).
 
     Returns:
         Positions [m], (n, 3), and volumes [m³], (n,), all equal, whose sum is the volume that the mesh encloses.
@@ -47,6 +48,10 @@ def mesh(
     """
     surface = read_surface(file, scale, repair)
     who = f"mesh {file}"
+    if repair.take:
+        surface = surface if surface.volume > 0.0 else surface.turned()
+        solid = Solid(*surface.extent, None, surface.query(winding=0.5), surface.query(winding=None))
+        return solid.fill(spacing, filling, relaxation, who)
     surface.check_closed(who)
     if not abs(surface.volume) > 1e-9 * np.prod(np.ptp(surface.extent, axis=0)):
         raise ValueError(f"{who}: the surface must enclose a volume, got {surface.volume:.6g} m^3")

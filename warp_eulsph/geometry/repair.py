@@ -22,11 +22,14 @@ class Repair:
             closed without; 0 joins only what is equal to the last bit.
         close: close openings, each by triangles in the plane that fits its rim best.
         turn: turn facets so that neighbours face the same way, each piece as most of its area does.
+        take: take the surface as it is then, be it open or passing through itself: inside is where its winding number
+            is more than ½, and the volume is that of the particles of the filling that lie there.
     """
 
     weld: float | None = None
     close: bool = False
     turn: bool = False
+    take: bool = False
 
     def __post_init__(self) -> None:
         checked_weld(self.weld)
@@ -136,7 +139,8 @@ def _rims(triangles: np.ndarray, who: str) -> list[list[int]]:
     if (np.abs(balance) > 1).any():
         raise ValueError(
             f"{who}: triangles along {(np.abs(balance) > 1).sum()} edges turn against each other, so that openings "
-            "have no rim; turn them alike first: repair=Repair(close=True, turn=True)"
+            "have no rim; turn them alike first by repair=Repair(close=True, turn=True), or take the surface as it "
+            "is by repair=Repair(take=True)"
         )
     onward: dict[int, list[int]] = {}
     for (low, high), way in zip(edges.ends[balance != 0].tolist(), balance[balance != 0].tolist(), strict=True):

@@ -87,7 +87,7 @@ class Surface:
             f"{who}: the surface must be closed and its triangles turn the same way, got {len(wrong)} edges that do "
             f"not border two such triangles, {loose} of them at an opening, the first at "
             f"{self.points[wrong[0, 0]]} m; mend it by {' and '.join(remedies)}, where corners miss each other by "
-            "repair=Repair(weld=...), or in a mesh tool"
+            "repair=Repair(weld=...), or in a mesh tool; repair=Repair(take=True) takes it as it is"
         )
 
     def check_simple(self, who: str) -> None:
@@ -107,7 +107,8 @@ class Surface:
         if wrong.any():
             raise ValueError(
                 f"{who}: the surface of a mesh must not pass through itself, nor face inwards where there is no matter "
-                f"around, got one that does at {x[wrong][0]} m; mend it in a mesh tool"
+                f"around, got one that does at {x[wrong][0]} m; mend it in a mesh tool, or take it as it is by "
+                "repair=Repair(take=True)"
             )
 
     def turned(self) -> "Surface":

@@ -58,7 +58,8 @@ def _by_boolean(surface: Surface, parts: list[Surface], who: str) -> Surface:
         if not around:
             raise ValueError(
                 f"{who}: a piece of the surface that faces inwards must be a hollow within one that faces outwards, "
-                f"got one at {part.points[part.triangles[0, 0]]} m that is not; turn it in a mesh tool"
+                f"got one at {part.points[part.triangles[0, 0]]} m that is not; turn it in a mesh tool, or take "
+                "the surface as it is by repair=Repair(take=True)"
             )
         hollows[min(around)[1]].append(hollow)
     pieces = [
@@ -90,6 +91,7 @@ def _manifold(part: Surface, library: Any, who: str) -> Any:
     if made.status() != library.Error.NoError:
         raise ValueError(
             f"{who}: pieces of the surface that meet must be of facets that border one other along each edge, got "
-            f"{made.status()} for the one at {part.points[part.triangles[0, 0]]} m; unite them in a mesh tool"
+            f"{made.status()} for the one at {part.points[part.triangles[0, 0]]} m; unite them in a mesh tool, or take "
+            "the surface as it is by repair=Repair(take=True)"
         )
     return made

@@ -1,5 +1,7 @@
 """Fields that a frame derives from those it holds."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .tensors import first_piola
@@ -16,6 +18,14 @@ DERIVED = {
 
 class Derived:
     """Stresses and strains of a frame with ``cauchy_stress`` and ``F``."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def F(self) -> np.ndarray: ...
+
+        @property
+        def cauchy_stress(self) -> np.ndarray: ...
 
     @property
     def von_mises(self) -> np.ndarray:

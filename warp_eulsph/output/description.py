@@ -71,8 +71,8 @@ def _solids(simulation: RecordedSolids) -> dict[str, Any]:
 def _body(body: Body) -> dict[str, Any]:
     """A body, with those options that it has of its own."""
     options: dict[str, Any] = plain(body)
-    own = {name for name in Options._fields if getattr(body, name) is not None}
-    return {name: value for name, value in options.items() if name in own or name not in Options._fields}
+    seldom = (*Options._fields, "bonded")
+    return {name: value for name, value in options.items() if name not in seldom or getattr(body, name) is not None}
 
 
 def plain(value: Any) -> Any:

@@ -178,14 +178,14 @@ class BalancedPairs(UpwindForces):
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Balance the new reference."""
         reference, near, simd = configuration.fields, configuration.near, configuration.simd
-        n = len(self.psi)
+        n, K = len(self.psi), configuration.K
         configuration.defect(state.surface, self.defect)
         self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface, self.torn])
         for sweep in range(self.option.sweeps):
             old, new = self.psi, self._other
             if (self.option.sweeps - sweep) % 2:  # the last sweep writes ψ, the others take turns
                 old, new = new, old
-            arguments = [reference, near, configuration.K, self.defect, old, new]
+            arguments = [reference, near, K, self.defect, old, new]
             self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
         self._launch(_make_shift(self.space), n, [self.particles, reference, self.psi, self.option.bound])
-        self._launch(_make_correct(self.space, simd), n, [reference, near, configuration.K, configuration.poor])
+        self._launch(_make_correct(self.space, simd), n, [reference, near, K, configuration.poor])

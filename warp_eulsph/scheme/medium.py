@@ -37,6 +37,7 @@ class MediumParts:
         flux: of its bodies.
         configuration: its reference k.
         surface_given: the bodies came with their area vectors.
+        groups: number of each body, equal for those that are bonded to each other.
     """
 
     options: Scheme
@@ -46,11 +47,18 @@ class MediumParts:
     flux: Flux
     configuration: Configuration
     surface_given: bool
+    groups: Sequence[int]
 
 
 def is_corrected(options: Scheme, policy: ReferencePolicy, surface_given: bool) -> bool:
     """Whether the scheme's correction is at work: a fixed reference needs it only where surface vectors were given."""
     return options.correction is not None and (surface_given or not policy.fixed)
+
+
+def _check_bonds(groups: Sequence[int], per_body: bool, who: str) -> None:
+    """Raise ValueError where bodies are bonded and something closes its sums body by body."""
+    if per_body and len(set(groups)) < len(groups):
+        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance(), and no shifting")
 
 
 def _held(conditions: Sequence[Bound], span: range) -> np.ndarray:
@@ -76,6 +84,7 @@ class Medium:
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
+            _check_bonds(parts.groups, True, "shifting")
             held = _held(conditions, self.span)
             self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
@@ -84,12 +93,13 @@ class Medium:
         plain = self.configuration.plain
         self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
+            _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
             self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
             simd = self.configuration.simd and not sensed
-            self.pairs = PairPotentials(options.tie, plain, simd, space, self.flux, device)
+            self.pairs = PairPotentials(options.tie, plain, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
         self.limiter: MassDiffusion | None = None
@@ -156,8 +166,8 @@ class Medium:
             U = self.of(state)
             self.velocity_gradient(state)
             self.configuration.gradient(self._rows(U.F), self.grad_F)
-            potentials = self.stabiliser.psi  # type: ignore[attr-defined]
-            self.shifter.apply(self.configuration.fields, potentials, U, self.grad_v, self.grad_F, self.clock)
+            psi = self.stabiliser.psi
+            self.shifter.apply(self.configuration.fields, psi, U, self.grad_v, self.grad_F, self.clock)
 
     # the lines of a step
 

@@ -30,6 +30,7 @@ class PairAreas(Correction):
 
     kappa: float = 1.0
     iterations: int = 5
+    per_body = True
 
     def __post_init__(self) -> None:
         if not self.kappa >= 0.0:

@@ -1,6 +1,7 @@
 """What acts between pairs that keep their labels: the tie (M16) and dissipation (M9), forces and stresses in a pass."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import warp as wp
@@ -263,16 +264,19 @@ class PairPotentials:
         tie: None ties nothing.
         damped: whether M9 is among them; where a correction changes M5 (M10 to M12), M9 comes with that.
         simd: whether the pass runs by SIMD kernels, which know of no sensor.
+        groups: number of each body, equal for those that are bonded: they have the modulus of the softest, so that
+            pairs across the joint find the same at both ends.
     """
 
-    def __init__(self, tie: Tie | None, damped: bool, simd: bool, space: Space, flux: Flux, device: Any):
+    def __init__(
+        self, tie: Tie | None, damped: bool, simd: bool, space: Space, flux: Flux, groups: Sequence[int], device: Any
+    ):
         self.space, self.flux, self._launch = space, flux, Launcher(device)
         self._damped, self._simd = damped, simd and damped
         n = len(flux.fields.Q)
-        self._bodies = [
-            (body, tie.modulus(M, mu, space.dim) if tie is not None else 0.0)
-            for body, (M, mu) in zip(flux.bodies, flux.moduli(), strict=True)
-        ]
+        moduli = [tie.modulus(M, mu, space.dim) if tie is not None else 0.0 for M, mu in flux.moduli()]
+        softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
+        self._bodies = list(zip(flux.bodies, softest, strict=True))
         self._rows = packed_rows(space, n if self._simd else 0, _vectors(space), device)
         self._D = wp.zeros(n if damped and not self._simd else 0, dtype=space.mat, device=device)
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)

@@ -145,7 +145,7 @@ class Configuration:
 
     Args:
         box: lengths of the periodic box [m], zero where open.
-        fixed: it stays that of the start, F_k = I; else a refresh reads the arrangement anew.
+        fixed: it is that of the start for good, F_k = I.
         corrected: something changes L or the pair vectors after M3 (M10 to M13). Where nothing does and the reference
             is fixed (``plain``), arrays of the same values are one.
         tilt: of the weights (M17), where the reference is plain.
@@ -179,7 +179,7 @@ class Configuration:
         if self.plain:
             self.fields.balanced = self.fields.x
         tilted = self.tilt is not None
-        self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device, tilted)
+        self.lists = NeighbourLists(space, weight, self.fields.h, particles.group, box, device, tilted)
         self.K = self.fields.L if self.plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
@@ -196,8 +196,7 @@ class Configuration:
 
     def move(self, state: Any) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
-        arguments = [state, self.particles, self.fields]
-        self._launch(_make_adopt(self.space, self.fixed), len(self.K), arguments)
+        self._launch(_make_adopt(self.space, self.fixed), len(self.K), [state, self.particles, self.fields])
         self.lists.count_neighbours(self.fields.x)
 
     def renew(self) -> None:

@@ -13,6 +13,8 @@ from .reference import Configuration
 class Correction(ABC):
     """What makes arrangements stable that move with the reference: options; ``build`` makes the part that acts."""
 
+    #: It closes sums body by body, and so cannot do with bodies that are bonded to each other.
+    per_body: ClassVar[bool] = False
     #: Its stabiliser has potentials ``psi``, (n,) of vec, that shifting (M15) follows.
     has_potentials: ClassVar[bool] = False
 
@@ -26,6 +28,8 @@ class Stabiliser(ABC):
 
     #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
     corrects: ClassVar[bool] = True
+    #: Potentials [m], (n,) of vec, of corrections that have them.
+    psi: wp.array
 
     @abstractmethod
     def refresh(self, configuration: Configuration, state: Any) -> None:

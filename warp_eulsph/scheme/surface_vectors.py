@@ -25,6 +25,7 @@ class SurfaceVectors(Correction):
     """
 
     project: bool = False
+    per_body = True
 
     def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "SurfaceForces":
         """Allocate for the bodies of ``flux``, each a range of particles."""

@@ -169,9 +169,11 @@ class World:
             name = "" if len(self.media) == 1 else f"Medium.{k}."
             listed.append({name + own: array for own, array in medium.evolving().items()})
         listed += [self.clock.evolving(), self.ledger.evolving()]
-        for kind, parts in (("Condition", self.conditions), ("Interaction", self.interactions)):
-            for i, part in enumerate(parts):
-                listed.append({f"{kind}.{i}.{name}": array for name, array in part.evolving().items()})
+        parts: list[tuple[str, Bound | BoundInteraction]] = []
+        parts += [(f"Condition.{i}", condition) for i, condition in enumerate(self.conditions)]
+        parts += [(f"Interaction.{i}", interaction) for i, interaction in enumerate(self.interactions)]
+        for own, part in parts:
+            listed.append({f"{own}.{name}": array for name, array in part.evolving().items()})
         return {name: array for held in listed for name, array in held.items()}
 
     # of the only medium, where there is one

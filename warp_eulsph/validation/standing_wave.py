@@ -70,7 +70,7 @@ def build(dim: int, n: int, reference: ReferencePolicy, **options: Any) -> tuple
     wave = StandingWave(x)
     material = LinearElastic(density=DENSITY, young=YOUNG, poisson=POISSON)
     body = Body(x=x, volume=volume, material=material, velocity=wave.velocity(0.0))
-    depth = 2 * CubicSpline().support * DILATION / n  # ghosts next to the plane need all of their own neighbours
+    depth = 3 * CubicSpline().support * DILATION / n  # ghosts next to the plane need all neighbours, and these theirs
     conditions = []
     for i in range(dim):
         for position, image in ((0.0, Wall()), (1.0, Antisymmetry())):
