@@ -55,6 +55,7 @@ FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
     "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
     "tie": Field("mat", "Pa", "share of Q that ties F to the positions (M16); empty where nothing is tied"),
+    "dissipated": Field("real", "J", "energy that the law dissipated in the last step; empty where none does"),
     "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
     "impedance": Field("real", "kg/(m^2 s)", "density times pressure-wave speed, both measured in the reference (M9)"),
     "shear_impedance": Field(

@@ -144,7 +144,7 @@ class Sorting:
         stepper, n = self.stepper, self.stepper.n
         conditions = [array for condition in stepper.conditions for array in condition.evolving().values()]
         own = {id(array) for array in conditions}  # they go by number
-        bodies = dict(zip(map(id, stepper.flux.histories), stepper.flux.bodies, strict=True))
+        bodies = {id(part.history): range(part.first, part.first + part.size) for part in stepper.flux.parts}
         for array in stepper.evolving().values():
             body = bodies.get(id(array), range(n))
             if len(array) == len(body) and id(array) not in own:

@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 
 from ..fields import PARTICLES, STATE
+from ..materials import Variable
 from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
 from ..simulation import Simulation
 from ..transport import Transport
@@ -87,15 +88,26 @@ TRANSPORT_FIELDS = {
     **{name: FIELDS[name] for name in ("body", "particle")},
 }
 KNOWN = {**FIELDS, **TRANSPORT_FIELDS}
+# Before the name of a history variable, as a source.
+HISTORY = "history of "
 
 
-def known_fields(names: Iterable[str] | None) -> tuple[str, ...] | None:
-    """The names, checked to be those of some field; None stays None, all that there will be.
+def source(name: str, simulation: Recorded) -> wp.array | np.ndarray:
+    """What fields are made of, by the name of a source: of ``SOURCES``, or a history variable."""
+    if isinstance(simulation, Simulation) and name.startswith(HISTORY):
+        return simulation.history(name.removeprefix(HISTORY))
+    return SOURCES[name](simulation)
 
-    Raises:
-        ValueError: a name of no field.
-    """
-    return None if names is None else tuple(_chosen(names, KNOWN))
+
+def history_fields(simulation: Simulation) -> dict[str, SnapshotField]:
+    """What the materials of a simulation remember, as fields; NaN in bodies whose law does not."""
+    variables = [variable for part in simulation.stepper.flux.parts for variable in part.law.history]
+    return {variable.name: _remembered(variable) for variable in variables}
+
+
+def _remembered(variable: Variable) -> SnapshotField:
+    shape = (3, 3) if isinstance(variable.start, tuple) else ()
+    return SnapshotField(lambda d: shape, variable.unit, variable.meaning, (HISTORY + variable.name,))
 
 
 def chosen_fields(names: Iterable[str] | None, simulation: Recorded) -> dict[str, SnapshotField]:
@@ -105,7 +117,7 @@ def chosen_fields(names: Iterable[str] | None, simulation: Recorded) -> dict[str
         ValueError: a name that is none of its fields.
     """
     if isinstance(simulation, Simulation):
-        return _chosen(names, FIELDS)
+        return _chosen(names, {**FIELDS, **history_fields(simulation)})
     held = {name: field for name, field in TRANSPORT_FIELDS.items() if name != "exact" or simulation.exact is not None}
     return _chosen(names, held)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..boundaries import Assembly, Region
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
-from .fields import Recorded, known_fields
+from .fields import Recorded
 from .probes import Probe
 from .snapshot import checked_precision
 
@@ -44,7 +44,7 @@ class Recording:
     checkpoint: float = 600.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "fields", known_fields(self.fields))
+        object.__setattr__(self, "fields", None if self.fields is None else tuple(self.fields))
         object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
         object.__setattr__(self, "probes", tuple(self.probes))
         names = [probe.name for probe in self.probes]

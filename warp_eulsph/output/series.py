@@ -11,7 +11,7 @@ import numpy as np
 from .atomic import replace_file
 from .copies import Copies
 from .directory import RunDirectory
-from .fields import Recorded, known_fields
+from .fields import Recorded
 from .manifest import Manifest, entry_of
 from .snapshot import Frame, checked_precision, collect, encode
 from .temporal import write_index
@@ -52,7 +52,8 @@ class SnapshotWriter:
         resume: bool = False,
     ):
         self.directory = Path(directory)
-        self.fields, self.dtype = known_fields(fields), checked_precision(dtype)
+        self.fields = None if fields is None else tuple(fields)
+        self.dtype = checked_precision(dtype)
         self.particles, self.manifest = particles, Manifest(self.directory)
         if particles is not None and self.fields is not None and "particle" not in self.fields:
             self.fields = (*self.fields, "particle")

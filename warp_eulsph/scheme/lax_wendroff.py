@@ -103,7 +103,7 @@ class LaxWendroffStepper:
         if not self.moves_surfaces:
             self.half.surface = U.surface
         self.particles, self.flux, self.configuration = particles, flux, configuration
-        self.policy, self.clock, self.conditions = policy, clock, conditions
+        self.policy, self.clock, self.conditions, self.moving = policy, clock, conditions, moving
         self.forces = allocate(space, "Forces", n, device, empty=("correction", "tie", "external"))
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         self.shifter: Shifter | None = None
@@ -165,20 +165,20 @@ class LaxWendroffStepper:
         self._gradients(U)  # M4: ∇_k v, ∇_k F
         self._choose_dt(U)
         self._sense(U)  # §5: d of vⁿ for both half steps, and the diffusion of Uⁿ
-        self._stress(U)  # M1: Q = P F_kᵀ / J_k
+        self._stress(U, 0.0)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, U.v, 0.0)  # M5, M9
         self._smooth(U, half)  # M6 or M7: S(U)
         self._predict(U, half, 0.5)  # M8: U^{n+½}
         self._impose(half, 0.5)
         self._velocity_gradient(half)  # M4
-        self._stress(half)  # M1
+        self._stress(half, 0.5)  # M1
         self._sum_forces(half, half.v, 0.5)  # M5, M9
         self._kick(U)  # M8: v^{n+1}
         self._drift(U, half.v, 1.0, U)  # M8: F^{n+1}, x^{n+1}
         self._limit(U)  # §5: U^{n+1} += d × diffusion
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
-        self.flux.carry(U.F)  # fluids keep J only
+        self._update(U)  # histories; liquids keep J only
         check(self._launch, self.space, U, self.clock.fields)
         self.ledger.record(U, half, self.grad_v, self.forces)
         self.clock.tick()
@@ -190,12 +190,14 @@ class LaxWendroffStepper:
     def refresh(self) -> None:
         """Make U the reference, shifted (M15)."""
         self._shift(self.U)
+        self.flux.rebase(self.U.F, self.moving)
         self.configuration.refresh(self.U)
         self._after_refresh()
 
     def move_reference(self) -> None:
         """First part of a refresh, launches only: the reference becomes U, shifted (M15); neighbours are counted."""
         self._shift(self.U)
+        self.flux.rebase(self.U.F, self.moving)
         self.configuration.move(self.U)
 
     def renew_reference(self) -> None:
@@ -205,10 +207,9 @@ class LaxWendroffStepper:
 
     def _shift(self, U: Any) -> None:
         if self.shifter is not None:
-            reference, psi = self.configuration.fields, self.stabiliser.psi
             self._velocity_gradient(U)
             self.configuration.gradient(self._rows(U.F), self.grad_F)
-            self.shifter.apply(reference, psi, U, self.grad_v, self.grad_F, self.clock.fields)
+            self.shifter.apply(self.configuration, self.stabiliser.psi, U, self.grad_v, self.grad_F, self.clock.fields)
             self._impose(U, 0.0)
             self.ledger.book_shift(U)
 
@@ -257,8 +258,8 @@ class LaxWendroffStepper:
     def _velocity_gradient(self, state: Any) -> None:
         self.configuration.gradient(state.v, self.grad_v)
 
-    def _stress(self, state: Any) -> None:
-        self.flux.compute(state.F, self.configuration)
+    def _stress(self, state: Any, fraction: float) -> None:
+        self.flux.compute(state.F, self.grad_v, self.configuration, self.clock.fields, fraction)
 
     def _sum_forces(self, state: Any, v: wp.array, fraction: float) -> None:
         forces, configuration, options = self.forces, self.configuration, self.options
@@ -298,6 +299,9 @@ class LaxWendroffStepper:
             self.ledger.open_limiter(U)
             self.limiter.apply(U, self.clock.fields)
             self.ledger.close_limiter(U)
+
+    def _update(self, U: Any) -> None:
+        self.flux.update(U.F, self.grad_v, self.configuration, self.clock.fields)
 
     def _release(self, U: Any) -> None:
         wp.copy(self.forces.free_v, U.v)

@@ -15,19 +15,33 @@ from .reference import Configuration
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
+ACCOUNTS = ("external", "constraint", "dissipation", "material", "correction", "tie", "limiter", "stepping", "shifting")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> Any:
+def _note(space: Space) -> Any:
+    """``wp.func``: keep the end of a step as the start of the next."""
+    vec, State, wide = space.vec, structure(space, "State"), wp.float64
+
+    @wp.func
+    def note(a: int, state: State, W: wp.array(dtype=wide), v_old: wp.array(dtype=vec), W_old: wp.array(dtype=wide)):
+        v_old[a] = state.v[a]
+        W_old[a] = W[a]
+
+    return note
+
+
+@functools.cache
+def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool, inelastic: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
-    The tie's is the power of its force and of its stress, which Q holds and W does not (M16).
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16). The material's is what
+    the laws say that they dissipated (``inelastic``).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -36,7 +50,7 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
         structure(space, "State"),
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
-    Flux = structure(space, "Flux")
+    Flux, note = structure(space, "Flux"), _note(space)
     precise = vector_type(space.dim, wp.float64)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
@@ -68,7 +82,6 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
             v = precise(state.v[a])
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
-            internal = precise(forces.internal[a])
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
             strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate)
             tie = wide(0.0)
@@ -76,7 +89,11 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
                 tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
                 strain_power -= tied_power
                 tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
-            stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
+            lost = wide(0.0)
+            if wp.static(inelastic):
+                lost = wide(flux.dissipated[a])
+            lag = v_mean - precise(half.v[a])
+            stepping = W[a] - W_old[a] + lost - dt * strain_power + dt * wp.dot(precise(forces.internal[a]), lag)
             limiter = wide(0.0)
             if wp.static(limited):
                 limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
@@ -87,6 +104,7 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
                 dt * wp.dot(precise(forces.external[a]), v_mean),
                 wp.dot(impulse, v_mean),
                 dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+                -lost,
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
                 tie,
                 limiter,
@@ -95,8 +113,7 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
             )
             if dt > wide(0.0):
                 forces.reaction[a] = vec(impulse / dt)
-            v_old[a] = state.v[a]
-            W_old[a] = W[a]
+            note(a, state, W, v_old, W_old)
         out[block] = total
 
     return entries
@@ -107,7 +124,7 @@ def _make_shift_entry(space: Space) -> Any:
     """Kernel of ``SumOfParticles``: energy gained since the last entry, all of it by shifting (M15)."""
     vec, Particles, State, wide = space.vec, structure(space, "Particles"), structure(space, "State"), wp.float64
     precise = vector_type(space.dim, wp.float64)
-    last = len(ACCOUNTS) - 1
+    last, note = len(ACCOUNTS) - 1, _note(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift_entry(
@@ -127,8 +144,7 @@ def _make_shift_entry(space: Space) -> Any:
             v, before = precise(state.v[a]), precise(v_old[a])
             gain = wide(0.5) * wide(particles.mass[a]) * wp.dot(v - before, v + before) + W[a] - W_old[a]
             total += wide(particles.share[a]) * gain
-            v_old[a] = state.v[a]
-            W_old[a] = W[a]
+            note(a, state, W, v_old, W_old)
         entry = _Entry()
         entry[last] = total
         out[block] = entry
@@ -242,8 +258,9 @@ class Ledger:
             dv = self.limiter.dv if self.limiter is not None else self._v_old
         arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
         arguments += [self.clock.fields, forces]
-        tied = len(self.flux.fields.tie) > 0
-        self._book(_make_entries(self.space, tied, self.limiter is not None, smoothed is not None), arguments)
+        tied, inelastic = len(self.flux.fields.tie) > 0, len(self.flux.fields.dissipated) > 0
+        kernel = _make_entries(self.space, tied, self.limiter is not None, smoothed is not None, inelastic)
+        self._book(kernel, arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
