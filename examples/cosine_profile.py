@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warp_eulsph.scheme.scalar import ConservationLaw, LinearAdvection, Scheme
+from warp_eulsph.scheme.scalar import ConservationLaw, LinearAdvection, ScalarScheme
 from warp_eulsph.validation.cases.cosine_profile import EXPECTED, LAX, LAX_WENDROFF, measure
 
 PARTICLES, BOX, END = 50, 3.0, 0.6
@@ -28,7 +28,7 @@ def profile(x: np.ndarray, centre: float) -> np.ndarray:
     return np.where(away <= 0.12, 0.5 * (1.0 + np.cos(np.pi * away / 0.12)), 0.0)
 
 
-def solve(scheme: Scheme, dilation: float, cfl: float) -> tuple[np.ndarray, np.ndarray]:
+def solve(scheme: ScalarScheme, dilation: float, cfl: float) -> tuple[np.ndarray, np.ndarray]:
     """Positions in ]0, 1[ and the solution there at t = 0.6."""
     dx = 1.0 / PARTICLES
     x = (np.arange(round(BOX / dx)) + 0.5) * dx

@@ -17,17 +17,17 @@ def cloud(dim, side=6, jitter=0.2, seed=1):
 
 def configuration_of(x, volume, h, *, weight=CubicSpline(), real=wp.float64, box=None, density=1.0):
     """The reference on positions ``x`` (n, dim), refreshed; ``h`` a number or (n,)."""
-    n, dim = x.shape
+    (n, dim), device = x.shape, wp.get_device()
     space = Space(dim, real, box is not None)
-    particles = allocate(space, "Particles", n, "cpu")
+    particles = allocate(space, "Particles", n, device)
     particles.mass.assign(density * volume)
     particles.V0.assign(volume)
     particles.spacing.assign(volume ** (1.0 / dim))
     particles.h.assign(np.broadcast_to(h, n))
-    state = allocate(space, "State", n, "cpu")
+    state = allocate(space, "State", n, device)
     state.x.assign(x)
     state.F.assign(np.broadcast_to(np.eye(dim), (n, dim, dim)))
-    configuration = Configuration(space, weight, particles, box if box is not None else (0.0,) * dim, "cpu")
+    configuration = Configuration(space, weight, particles, box if box is not None else (0.0,) * dim, device)
     configuration.refresh(state)
     return configuration
 

@@ -7,6 +7,7 @@ import signal
 import time
 
 import numpy as np
+from bodies import lattice
 
 import warp_eulsph as es
 from warp_eulsph.output import BodyProbe, PointProbe, ReactionProbe, Recording, SectionProbe, record
@@ -19,8 +20,7 @@ UNTIL = 2e-3
 
 def plate(young=17e6, reference=es.Every(3)):
     """A plate of 36 particles, held at one end and driven at the other; the simulation and both conditions."""
-    s = (np.arange(6) + 0.5) / 6
-    x = np.stack(np.meshgrid(s, s, indexing="ij"), -1).reshape(-1, 2)
+    x = lattice(2, 6)
     rubber = es.NeoHookean(density=1100.0, young=young, poisson=0.45)
     body = es.Body(x=x, volume=1 / 36, material=rubber, velocity=20.0 * np.sin(3.0 * x[:, ::-1]), name="plate")
     held = es.Fixed(lambda X: X[:, 0] < 1 / 6)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import warp as wp
+from bodies import COMPRESSIBLE
 
 import warp_eulsph as es
 from warp_eulsph.geometry import Relaxation, Staggered, box, disc, sphere
-
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
 
 
 def external(simulation):
@@ -19,7 +18,7 @@ def external(simulation):
 
 def forces_of(shape, *conditions, reference=es.Never(), **options):
     """External forces [N] on a body of positions and volume ``shape`` at the start, (n, dim)."""
-    body = es.Body(x=shape[0], volume=shape[1], material=RUBBER)
+    body = es.Body(x=shape[0], volume=shape[1], material=COMPRESSIBLE)
     return external(es.Simulation(body, boundaries=conditions, reference=reference, **options))
 
 

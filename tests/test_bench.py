@@ -82,23 +82,20 @@ def test_memory_counts_shared_arrays_once():
         pass
 
     Holder.__module__ = "warp_eulsph.somewhere"
-    array = wp.zeros(100, dtype=wp.vec3d, device="cpu")
+    array = wp.zeros(100, dtype=wp.vec3d)
     holder = Holder()
     holder.fields, holder.again, holder.part = {"a": array}, [array], array[10:20]
-    holder.other = wp.zeros(7, dtype=wp.float32, device="cpu")
+    holder.other = wp.zeros(7, dtype=wp.float32)
     assert array_bytes(holder) == 2400 + 28
 
 
+@pytest.mark.of_the_cpu
 @pytest.mark.parametrize("real", [wp.float32, wp.float64])
 def test_limits_of_the_machine_are_of_this_world(real):
     """Between a tenth of a slow core and a large server."""
-    threads = execution.threads()
     execution.set_threads(1)
-    try:
-        assert 1e9 < bandwidth(real) < 2e12
-        assert 1e9 < arithmetic(real) < 1e12
-    finally:
-        execution.set_threads(threads)
+    assert 1e9 < bandwidth(real) < 2e12
+    assert 1e9 < arithmetic(real) < 1e12
 
 
 def test_cost_of_snapshots_is_measured(capsys):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import warp as wp
+from bodies import COMPRESSIBLE
 from scipy.optimize import brentq
 
 import warp_eulsph as es
@@ -14,7 +15,6 @@ from warp_eulsph.scheme.smoothing import NeighbourAverage
 from warp_eulsph.validation.cases.bar import DENSITY, LENGTH, SPEED, WAVE_SPEED, YOUNG
 from warp_eulsph.validation.cases.bar import exact as bar_exact
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
 DX = 0.1
 
 
@@ -24,7 +24,7 @@ def lattice(*counts: int) -> np.ndarray:
 
 
 def block(*counts: int, **options) -> es.Body:
-    return es.Body(x=lattice(*counts), volume=DX ** len(counts), **{"material": RUBBER, **options})
+    return es.Body(x=lattice(*counts), volume=DX ** len(counts), **{"material": COMPRESSIBLE, **options})
 
 
 def external(simulation: es.Simulation) -> np.ndarray:
@@ -58,7 +58,7 @@ def test_free_fall_is_exact(counts, reference, dtype, tolerance):
 def test_gravity_pulls_one_body_down_the_last_axis(counts):
     dim = len(counts)
     far = np.eye(dim)[0] * 10.0
-    a, b = block(*counts, name="a"), es.Body(x=block(*counts).x + far, volume=DX**dim, material=RUBBER, name="b")
+    a, b = block(*counts, name="a"), es.Body(x=block(*counts).x + far, volume=DX**dim, material=COMPRESSIBLE, name="b")
     simulation = es.Simulation([a, b], boundaries=[es.Gravity(body="a")], time_step=es.TimeStep(fixed=1e-4))
     simulation.step(10)
     fallen = np.zeros((2 * len(a.x), dim))
@@ -81,7 +81,9 @@ def test_roller_is_an_inclined_plane(normal):
 
 def test_velocity_holds_some_axes_of_one_body():
     a = block(4, 4, name="a", velocity=(1.0, 1.0))
-    b = es.Body(x=lattice(4, 4) + np.array([3.0, 0.0]), volume=DX**2, material=RUBBER, velocity=(1.0, 1.0), name="b")
+    b = es.Body(
+        x=lattice(4, 4) + np.array([3.0, 0.0]), volume=DX**2, material=COMPRESSIBLE, velocity=(1.0, 1.0), name="b"
+    )
     condition = es.Velocity(lambda X: X[:, 1] > 0.2, lambda x, t: 5.0 * t, axes=[0], body="b")
     simulation = es.Simulation([a, b], boundaries=[condition], time_step=es.TimeStep(fixed=1e-4))
     simulation.step(3)
@@ -261,9 +263,9 @@ def test_quarter_with_walls_equals_the_full_problem(reference, scheme):
         return 40.0 * x * np.array([1.0, -0.5]) * (1.0 + x[:, :1] ** 2) * (1.0 + 2.0 * x[:, 1:] ** 2)
 
     x = lattice(12, 12) - 0.6
-    full = es.Body(x=x, volume=DX**2, material=RUBBER, velocity=velocity(x))
+    full = es.Body(x=x, volume=DX**2, material=COMPRESSIBLE, velocity=velocity(x))
     x = lattice(6, 6)
-    quarter = es.Body(x=x, volume=DX**2, material=RUBBER, velocity=velocity(x))
+    quarter = es.Body(x=x, volume=DX**2, material=COMPRESSIBLE, velocity=velocity(x))
     depth = 2 * 2.0 * 1.3 * DX
     ghosted, left = mirror(quarter, point=(0, 0), normal=(-1, 0), depth=depth)
     ghosted, bottom = mirror(ghosted, point=(0, 0), normal=(0, -2), depth=depth, image=Wall())
@@ -285,8 +287,8 @@ def test_half_of_a_block_equals_the_whole_behind_an_oblique_wall():
     x = lattice(8, 3, 3) - np.array([0.4, 0.0, 0.0])
     v = 30.0 * x * (1.0 + x[:, :1] ** 2) * (1.0 + x[:, 1:2])
     half = x[:, 0] > 0
-    whole = es.Body(x=x @ turn.T, volume=DX**3, material=RUBBER, velocity=v @ turn.T)
-    part = es.Body(x=x[half] @ turn.T, volume=DX**3, material=RUBBER, velocity=v[half] @ turn.T)
+    whole = es.Body(x=x @ turn.T, volume=DX**3, material=COMPRESSIBLE, velocity=v @ turn.T)
+    part = es.Body(x=x[half] @ turn.T, volume=DX**3, material=COMPRESSIBLE, velocity=v[half] @ turn.T)
     part, wall = mirror(part, point=(0, 0, 0), normal=-turn[:, 0], depth=2 * 2.0 * 1.3 * DX)
     step = es.TimeStep(fixed=1e-4)
     full = es.Simulation(whole, reference=es.Never(), time_step=step)
@@ -387,6 +389,6 @@ def test_mirror_errors(change, message):
 
 
 def test_free_end_needs_a_linear_law():
-    body = es.Body(x=lattice(8), volume=DX, material=RUBBER)
+    body = es.Body(x=lattice(8), volume=DX, material=COMPRESSIBLE)
     with pytest.raises(ValueError, match="linear law such as Bar or LinearElastic, got NeoHookean"):
         mirror(body, point=[0.0], normal=[-1.0], depth=0.5, image=Antisymmetry())

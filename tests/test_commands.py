@@ -163,7 +163,7 @@ def test_full_disk_is_one_and_can_be_resumed(case, tmp_path, capsys, monkeypatch
     assert "No space left on device" in capsys.readouterr().err
 
 
-def test_toml_cases_and_examples(tmp_path):
+def test_toml_cases_and_examples(tmp_path, device):
     path = tmp_path / "block.toml"
     path.write_text(TOML)
     assert main(["run", str(path), "-o", str(tmp_path / "run"), "-s", "parameters.n=5"]) == 0
@@ -176,7 +176,7 @@ def test_toml_cases_and_examples(tmp_path):
     program = tmp_path / "program.py"
     path.write_text(TOML)
     program.write_text(f"from warp_eulsph.cases import read_case\nCASE = read_case({str(path)!r})\n")
-    assert main(["run", str(program), "-o", str(tmp_path / "other"), "--device", "cpu"]) == 0
+    assert main(["run", str(program), "-o", str(tmp_path / "other"), "--device", device.alias]) == 0
     assert Run(tmp_path / "other")[0].N == 36
     assert main(["run", str(program), "-o", str(tmp_path / "third"), "-s", "n=3"]) == 2
     assert "punch" in examples()

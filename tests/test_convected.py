@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER
 
 import warp_eulsph as es
 from warp_eulsph.geometry import annulus, box
 from warp_eulsph.validation.cases import extension, hanging, shear
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 WATER = es.TaitLiquid(density=1000.0, sound_speed=100.0)
 SOFT = es.NeoHookean(density=1000.0, young=1e6, poisson=0.3)
 POLICIES = [es.Always(), es.Every(10), es.WhenDistorted(1.2)]

@@ -51,9 +51,10 @@ def late(monkeypatch):
     return made
 
 
+@pytest.mark.of_the_cpu
 def test_a_copy_on_the_cpu_is_there_at_once_and_stays():
-    array = wp.array([1.0, 2.0], dtype=wp.float64, device="cpu")
-    copy = copies.Copies("cpu").take(array)
+    array = wp.array([1.0, 2.0], dtype=wp.float64)
+    copy = copies.Copies(array.device).take(array)
     array.fill_(3.0)
     assert not copy.on_its_way and copy.values.tolist() == [1.0, 2.0]
 

@@ -3,9 +3,9 @@
 No GPU: Warp's ahead-of-time compiler needs no driver. ``-s`` prints the registers of each kernel.
 """
 
-import numpy as np
 import pytest
 import warp as wp
+from bodies import block
 from cubin import usage
 
 import warp_eulsph as es
@@ -30,10 +30,7 @@ def test_kernels_of_a_step_compile_and_do_not_spill(dim, dtype, arch, monkeypatc
 
     monkeypatch.setattr(wp, "launch", recording_launch)
     monkeypatch.setattr(execution, "_simd", False)  # the portable kernels, which GPUs run
-    s = (np.arange(5) + 0.5) / 5
-    x = np.stack(np.meshgrid(*[s] * dim, indexing="ij"), -1).reshape(-1, dim)
-    material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
-    body, fixed = es.Body(x=x, volume=5.0**-dim, material=material), es.Fixed(lambda X: X[:, 0] < 0.2)
+    body, fixed = block(dim, 5), es.Fixed(lambda X: X[:, 0] < 0.2)
     for scheme, reference in (
         (es.Verlet(), es.Always()),
         (es.Verlet(), es.Never()),

@@ -9,14 +9,14 @@ from warp_eulsph.cli import main
 from warp_eulsph.commands import doctor
 
 
-def test_doctor_tells_versions_devices_and_speed(capsys, monkeypatch):
+def test_doctor_tells_versions_devices_and_speed(capsys, monkeypatch, device):
     monkeypatch.setattr(doctor, "SIDE", 5)
     monkeypatch.setattr(doctor, "STEPS", 2)
     assert main(["doctor"]) == 0
     lines = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
     assert lines["warp-lang"] == importlib.metadata.version("warp-lang")
     assert lines["kernel"] == f"cache   {wp.config.kernel_cache_dir}"
-    assert lines["device"].startswith("cpu")
+    assert lines["device"].startswith(device.alias)
     speed = float(lines["speed"].split()[1])
     assert 1e3 < speed < 1e9 and "5³ particles" in lines["speed"]
 

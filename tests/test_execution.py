@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import warp as wp
+from bodies import COMPRESSIBLE, RUBBER
 from clouds import cloud, configuration_of
 
 import warp_eulsph as es
@@ -15,24 +16,15 @@ from warp_eulsph import execution
 DTYPES = [wp.float32, wp.float64]
 SIDE = {1: 40, 2: 12, 3: 7}
 WEIGHTS = [subclass() for subclass in es.Weight.__subclasses__()]
-
-
-@pytest.fixture(autouse=True)
-def restored():
-    """Leave the settings as they were."""
-    threads, simd = execution.threads(), execution.simd("cpu")
-    yield
-    execution.set_threads(threads)
-    execution.set_simd(simd)
+pytestmark = pytest.mark.of_the_cpu
 
 
 def disordered(dim, dtype, reference, **options):
     """A jittered block of rubber in irregular motion, of two bodies that overlap."""
     x, volume = cloud(dim, SIDE[dim], jitter=0.15)
     rng = np.random.default_rng(2)
-    material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
     bodies = [
-        es.Body(x=x + shift, volume=volume, material=material, velocity=8.0 * rng.normal(size=x.shape), name=name)
+        es.Body(x=x + shift, volume=volume, material=RUBBER, velocity=8.0 * rng.normal(size=x.shape), name=name)
         for name, shift in (("one", 0.0), ("two", 0.3))
     ]
     return es.Simulation(
@@ -128,8 +120,7 @@ def test_simd_equals_portable_in_a_periodic_box(dim, dtype):
     found = {}
     for simd in (False, True):
         execution.set_simd(simd)
-        material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
-        body = es.Body(x=x, volume=volume, material=material, velocity=velocity, surface=0.0)
+        body = es.Body(x=x, volume=volume, material=COMPRESSIBLE, velocity=velocity, surface=0.0)
         simulation = es.Simulation(
             body, periodic=(1.0,) * dim, dtype=dtype, time_step=es.TimeStep(fixed=2e-6), arrangement=es.Current()
         )

@@ -5,6 +5,7 @@ import logging
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kept_runs import plate
@@ -15,7 +16,6 @@ from warp_eulsph.geometry import box
 from warp_eulsph.operators.neighbours import MOST_PAIRS
 from warp_eulsph.order import Order
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 X = plate().X
 N = len(X)
 
@@ -72,8 +72,8 @@ def test_mirror_ghosts_in_any_order_copy_their_own_source():
     assert np.array_equal(one.x, other.x)
 
 
-def test_regions_that_cannot_be_meant_are_refused():
-    assembly = Assembly(es.Space(2), wp.get_device("cpu"), X, None, {"plate": range(N)}, Order(N, "cpu"))
+def test_regions_that_cannot_be_meant_are_refused(device):
+    assembly = Assembly(es.Space(2), device, X, None, {"plate": range(N)}, Order(N, device))
     assert assembly.select([7, 3, 7, 5, 3], None, "who").tolist() == [7, 3, 5]
     for region, message in [
         (np.arange(4)[:, None], r"who: region indices must have shape \(k,\), got \(4, 1\)"),

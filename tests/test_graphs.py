@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER
 from clouds import cloud
 
 import warp_eulsph as es
@@ -16,7 +17,6 @@ from warp_eulsph.operators.neighbours import NeighbourLists
 
 SIDE = {1: 30, 2: 9, 3: 5}
 REFERENCES = [es.Never(), es.Every(3), es.Always(), es.WhenDistorted(1.02)]
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 SCHEMES = {
     "upwind switched by a sensor": es.Verlet(dissipation=es.Upwind(sensor=es.PaperSensor())),
     "limited": es.Verlet(limiter=es.FluxCorrectedTransport()),
@@ -27,15 +27,6 @@ SCHEMES = {
     "even sweeps": es.Verlet(correction=es.Balance(sweeps=4)),
     "Lax": es.Lax(),
 }
-
-
-@pytest.fixture(autouse=True)
-def restored():
-    """Leave the settings as they were."""
-    before, simd = execution._graphs, execution.simd("cpu")
-    yield
-    execution.set_graphs(before)
-    execution.set_simd(simd)
 
 
 def block(dim, reference, **options):
@@ -201,6 +192,7 @@ def test_restored_simulations_go_on_by_graphs():
     assert all(np.array_equal(value, bits(resumed)[name]) for name, value in bits(whole).items())
 
 
+@pytest.mark.of_the_cpu
 def test_defaults_and_bad_settings():
     execution.set_graphs(None)
     assert execution.graphs("cpu", 100) and not execution.graphs("cpu", 100_000)

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 import warp as wp
+from bodies import COMPRESSIBLE
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
 from warp_eulsph.output import Recording, Run, SnapshotWriter, points_on_line, record
 from warp_eulsph.output.shape_functions import shape_functions
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
 SPACING = 0.2
 
 
 def block(dim, shift=0.0, **options):
     """A unit block of jittered particles."""
     x, volume = box((0.0,) * dim, (1.0,) * dim, SPACING, jitter=0.2)
-    return es.Body(x=x + shift, volume=volume, material=RUBBER, **options)
+    return es.Body(x=x + shift, volume=volume, material=COMPRESSIBLE, **options)
 
 
 def frame_of(simulation, directory, **options):
@@ -113,7 +113,7 @@ def test_only_the_nearest_body_counts(tmp_path):
 def test_periodic_boxes_have_no_surface(tmp_path):
     x, volume = box((0.0, 0.0), (1.0, 1.0), 0.05)
     speed = np.sin(2 * np.pi * x[:, :1])
-    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=speed * [0.0, 1.0], surface=0.0)
+    body = es.Body(x=x, volume=volume, material=COMPRESSIBLE, velocity=speed * [0.0, 1.0], surface=0.0)
     simulation = es.Simulation(body, periodic=(1.0, 0.0))
     record(simulation, tmp_path, 1e-9, Recording(dtype=np.float64))
     points = points_on_line((-0.5, 0.5), (1.5, 0.5), 81)

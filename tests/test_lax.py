@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from bodies import COMPRESSIBLE, lattice
 
 import warp_eulsph as es
 from warp_eulsph.scheme.lax import Lax
 from warp_eulsph.scheme.smoothing import NeighbourAverage
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
 C_P = np.sqrt(17e6 * 0.7 / (1.3 * 0.4) / 1100.0)
 
 
@@ -18,7 +18,7 @@ def pulse(scheme, n, cfl, reference=es.Never(), dilation=1.0, amplitude=1e-6, tu
         return amplitude * np.sin(2.0 * np.pi * x)
 
     x = ((np.arange(n) + 0.5) / n)[:, None]
-    body = es.Body(x=x, volume=1.0 / n, material=RUBBER, velocity=wave(x) * C_P)
+    body = es.Body(x=x, volume=1.0 / n, material=COMPRESSIBLE, velocity=wave(x) * C_P)
     step = es.TimeStep(fixed=cfl / n / C_P)
     simulation = es.Simulation(
         body, scheme=scheme, reference=reference, periodic=(1.0,), dilation=dilation, time_step=step
@@ -63,9 +63,8 @@ def test_books_close_and_energy_falls(reference):
 
 
 def test_two_dimensions_with_a_held_edge_and_a_step_of_no_duration():
-    s = (np.arange(6) + 0.5) / 6
-    x = np.stack(np.meshgrid(s, s, indexing="ij"), -1).reshape(-1, 2)
-    body = es.Body(x=x, volume=1.0 / 36, material=RUBBER, velocity=np.stack([0.0 * x[:, 1], 2.0 * x[:, 0]], 1))
+    x = lattice(2, 6)
+    body = es.Body(x=x, volume=1.0 / 36, material=COMPRESSIBLE, velocity=np.stack([0.0 * x[:, 1], 2.0 * x[:, 0]], 1))
     held = es.Fixed(lambda X: X[:, 0] < 0.1)
     simulation = es.Simulation(body, boundaries=[held], scheme=Lax(), time_step=es.TimeStep(cfl=0.3))
     simulation.run(until=5e-3)

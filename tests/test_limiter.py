@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import warp as wp
+from bodies import COMPRESSIBLE
 from clouds import cloud, configuration_of, dense_N
 
 import warp_eulsph as es
@@ -13,7 +14,6 @@ from warp_eulsph.scheme.limiter import FluxCorrectedTransport
 from warp_eulsph.scheme.sensor import DimensionlessSensor, PaperSensor, SensorField
 
 SIDE = {1: 12, 2: 6, 3: 4}
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
 
 
 def prepared(dim, option, v, F, d, jitter=0.2, **lattice):
@@ -21,12 +21,12 @@ def prepared(dim, option, v, F, d, jitter=0.2, **lattice):
     x, volume = cloud(dim, SIDE[dim], jitter)
     h = lattice.pop("h", 1.4) / SIDE[dim]
     configuration = configuration_of(x, volume, h, density=3.0, **lattice)
-    diffusion = option.build(configuration.space, configuration.particles, configuration, "cpu")
+    diffusion = option.build(configuration.space, configuration.particles, configuration, wp.get_device())
     diffusion.refresh()
-    U = allocate(configuration.space, "State", len(x), "cpu")
+    U = allocate(configuration.space, "State", len(x), wp.get_device())
     U.v.assign(v)
     U.F.assign(F)
-    diffusion.prepare(U, wp.array(d, dtype=configuration.space.vec, device="cpu"))
+    diffusion.prepare(U, wp.array(d, dtype=configuration.space.vec))
     return diffusion, diffusion.dv.numpy().copy(), diffusion.dF.numpy().reshape(F.shape).copy(), (x, volume, h)
 
 
@@ -97,11 +97,13 @@ def test_saw_tooth_on_three_particles(conservative):
 def test_a_particle_alone_is_left_alone():
     x = np.array([[0.0], [1.0], [5.0]])
     configuration = configuration_of(x, np.ones(3), 1.0)
-    diffusion = FluxCorrectedTransport().build(configuration.space, configuration.particles, configuration, "cpu")
+    diffusion = FluxCorrectedTransport().build(
+        configuration.space, configuration.particles, configuration, wp.get_device()
+    )
     diffusion.refresh()
-    U = allocate(configuration.space, "State", 3, "cpu")
+    U = allocate(configuration.space, "State", 3, wp.get_device())
     U.v.assign(x)
-    diffusion.prepare(U, wp.ones(3, dtype=configuration.space.vec, device="cpu"))
+    diffusion.prepare(U, wp.ones(3, dtype=configuration.space.vec))
     dv = diffusion.dv.numpy()[:, 0]
     assert dv[2] == 0.0
     assert dv[0] == pytest.approx(-dv[1])
@@ -111,10 +113,10 @@ def test_a_particle_alone_is_left_alone():
 def sensed(option, x, volume, h, v, grad_v, speed=20.0, box=None):
     configuration = configuration_of(x, volume, h, box=box)
     space, n = configuration.space, len(x)
-    flux = allocate(space, "Flux", n, "cpu")
+    flux = allocate(space, "Flux", n, wp.get_device())
     flux.speed.fill_(speed)
-    field = SensorField(option, space, configuration.particles, "cpu")
-    arrays = (wp.array(v, dtype=space.vec, device="cpu"), wp.array(grad_v, dtype=space.mat, device="cpu"))
+    field = SensorField(option, space, configuration.particles, wp.get_device())
+    arrays = (wp.array(v, dtype=space.vec), wp.array(grad_v, dtype=space.mat))
     field.compute(configuration, flux, *arrays)
     return field.d.numpy().copy()
 
@@ -149,7 +151,7 @@ def test_sensor_takes_directions_apart_and_survives_zero_wave_speed():
 def bar(scheme, reference=es.Never(), n=24, **options):
     """A bar whose right quarter moves at once, the left end held: rings without dissipation."""
     x = ((np.arange(n) + 0.5) / n)[:, None]
-    body = es.Body(x=x, volume=1.0 / n, material=RUBBER, velocity=np.where(x > 0.75, 2.0, 0.0))
+    body = es.Body(x=x, volume=1.0 / n, material=COMPRESSIBLE, velocity=np.where(x > 0.75, 2.0, 0.0))
     held = es.Fixed(lambda X: X[:, 0] < 1.0 / n)
     return es.Simulation(body, boundaries=[held], reference=reference, scheme=scheme, **options)
 
@@ -221,7 +223,7 @@ def test_sensed_upwind_damps_overshoots(reference):
 def test_limiter_keeps_momentum_in_single_precision_and_in_three_dimensions(dim, real):
     x, volume = cloud(dim, 4 if dim == 3 else 12, jitter=0.1)
     velocity = np.where(x > 0.5, 1.0, -1.0) + np.arange(dim)
-    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=velocity)
+    body = es.Body(x=x, volume=volume, material=COMPRESSIBLE, velocity=velocity)
     scheme = es.LaxWendroff(
         smoothing=es.NeighbourAverage(Linear()), limiter=FluxCorrectedTransport(DimensionlessSensor(X=5.0))
     )

@@ -74,8 +74,8 @@ def test_functions_and_chains_are_the_same_on_host_and_device(text):
         out[a] = function(x[a], t)
 
     x = np.random.default_rng(0).uniform(-1.0, 4.0, (200, 2))
-    out = wp.zeros(len(x), dtype=row, device="cpu")
-    wp.launch(evaluate, len(x), [wp.array(x, dtype=space.vec, device="cpu"), 2.5, out], device="cpu")
+    out = wp.zeros(len(x), dtype=row)
+    wp.launch(evaluate, len(x), [wp.array(x, dtype=space.vec), 2.5, out])
     expected = expression({"x": x[:, 0], "y": x[:, 1], "t": 2.5})
     assert np.allclose(out.numpy()[:, 0], expected, rtol=1e-15)
 
@@ -114,8 +114,8 @@ def test_a_case_that_does_not_fit_is_wrong_input(tmp_path, monkeypatch, capsys):
     assert "use fewer particles, float32, or a smaller dilation" in capsys.readouterr().err
 
 
-def test_a_huge_dilation_counts_no_more_neighbours_than_there_are():
-    assert memory.bytes_per_particle(Space(3), 1e200, True, "cpu", 1000) < 1e5
+def test_a_huge_dilation_counts_no_more_neighbours_than_there_are(device):
+    assert memory.bytes_per_particle(Space(3), 1e200, True, device, 1000) < 1e5
 
 
 def group(folder, limit, used, *, old=False, inactive=0):

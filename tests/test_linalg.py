@@ -56,9 +56,9 @@ def _make_bounds(space):
 def test_bounds_of_stretches_hold_and_are_those_of_the_product(space):
     A = matrices(space)
     n, pair = len(A), space.row(2)
-    out, same = (wp.zeros(n, dtype=pair, device="cpu") for _ in range(2))
-    shortening = wp.zeros(n, dtype=space.real, device="cpu")
-    wp.launch(_make_bounds(space), n, [wp.array(A, dtype=space.mat, device="cpu"), out, same, shortening], device="cpu")
+    out, same = (wp.zeros(n, dtype=pair) for _ in range(2))
+    shortening = wp.zeros(n, dtype=space.real)
+    wp.launch(_make_bounds(space), n, [wp.array(A, dtype=space.mat), out, same, shortening])
     squares = np.linalg.svd(A.astype(float), compute_uv=False) ** 2
     low, high = out.numpy().astype(float).T
     # The spread s is (2/3) √D, D = |A|⁴ − 3 |cof A|² in 3-D, of which round-off may be all there is: some 50 ε in D
@@ -92,9 +92,9 @@ def _make_roots(space):
 def test_roots_are_right_to_the_last_place(space):
     x = np.concatenate([10.0 ** np.linspace(-30, 30, 100_001), [1.0, 8.0, 27.0]]).astype(space.numpy)
     given = np.concatenate([x, [0.0, -1.0, np.nan]]).astype(space.numpy)
-    out, stretches = (wp.zeros(len(given), dtype=space.real, device="cpu") for _ in range(2))
-    arguments = [wp.array(given, dtype=space.real, device="cpu"), out, stretches]
-    wp.launch(_make_roots(space), len(given), arguments, device="cpu")
+    out, stretches = (wp.zeros(len(given), dtype=space.real) for _ in range(2))
+    arguments = [wp.array(given, dtype=space.real), out, stretches]
+    wp.launch(_make_roots(space), len(given), arguments)
     wide = np.longdouble(x)
     assert np.abs(out.numpy()[:-3] * np.cbrt(wide) - 1.0).max() <= eps(space)
     assert np.isnan(out.numpy()[-3:]).all()
@@ -119,9 +119,9 @@ def test_area_vectors_move_by_nansons_rule(space):
     F = matrices(space)
     F_new = F[::-1].copy()
     s = np.random.default_rng(0).normal(size=F.shape[:2]).astype(space.numpy)
-    device = [wp.array(s, dtype=space.vec, device="cpu")]
-    device += [wp.array(f, dtype=space.mat, device="cpu") for f in (F, F_new)]
-    wp.launch(_make_moved(space), len(F), device, device="cpu")
+    device = [wp.array(s, dtype=space.vec)]
+    device += [wp.array(f, dtype=space.mat) for f in (F, F_new)]
+    wp.launch(_make_moved(space), len(F), device)
     G = F_new.astype(float) @ np.linalg.inv(F.astype(float))
     exact = np.einsum("a,aji,aj->ai", np.linalg.det(G), np.linalg.inv(G), s)  # cof G = det(G) G⁻ᵀ
     assert np.abs(device[0].numpy() - exact).max() <= 400 * eps(space) * np.abs(exact).max()

@@ -5,16 +5,15 @@ import sys
 
 import numpy as np
 import pytest
+from bodies import COMPRESSIBLE
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
-
 
 def block(n=6, dim=2, **options):
     x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
-    return es.Body(x=x, volume=volume, material=RUBBER, **options)
+    return es.Body(x=x, volume=volume, material=COMPRESSIBLE, **options)
 
 
 def stretched(reference):
@@ -34,10 +33,15 @@ def test_body_is_a_short_table():
     assert "<th style" in body._repr_html_() and "block &lt;1&gt;" in body._repr_html_()
 
 
-def test_simulation_is_a_short_table():
+def test_simulation_is_a_short_table(device):
     simulation = stretched(es.Always())
     assert len(repr(simulation)) < 700
-    for part in ("36 particles, 2-D, float64 on cpu", "'body' (36 of NeoHookean)", "Fixed, BodyForce", "step 2"):
+    for part in (
+        f"36 particles, 2-D, float64 on {device.alias}",
+        "'body' (36 of NeoHookean)",
+        "Fixed, BodyForce",
+        "step 2",
+    ):
         assert part in repr(simulation)
     assert simulation._repr_html_().startswith("<table>")
 
@@ -48,7 +52,7 @@ def test_stresses_are_those_of_the_law(reference):
     F = np.zeros((36, 3, 3))
     F[:, :2, :2], F[:, 2, 2] = simulation.F, 1.0
     J = np.linalg.det(F)
-    mu, kappa = RUBBER.constants().values()
+    mu, kappa = COMPRESSIBLE.constants().values()
     inverse = np.linalg.inv(F).transpose(0, 2, 1)
     trace = np.einsum("nij,nij->n", F, F)
     P = mu * (J ** (-2 / 3))[:, None, None] * (F - (trace / 3)[:, None, None] * inverse)
@@ -77,7 +81,7 @@ def test_displacement_is_in_the_order_of_the_body():
     rng = np.random.default_rng(3)
     x, volume = box((0.0, 0.0), (1.0, 1.0), 1 / 8)
     x = rng.permutation(x)
-    simulation = es.Simulation(es.Body(x=x, volume=volume, material=RUBBER, velocity=(3.0, -1.0)))
+    simulation = es.Simulation(es.Body(x=x, volume=volume, material=COMPRESSIBLE, velocity=(3.0, -1.0)))
     simulation.run(1e-3)
     assert simulation.displacement == pytest.approx(np.broadcast_to([3e-3, -1e-3], x.shape), abs=1e-12)
 

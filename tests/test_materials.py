@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import warp as wp
+from bodies import lattice
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -80,12 +81,12 @@ def evaluate(material: Material, space: Space, F: np.ndarray) -> tuple[np.ndarra
     """P (…, d, d), Ψ (…,), wave moduli (…, 2) at F (…, d, d), of what remembers nothing yet."""
     law, dim = material.law(space), space.dim
     constants, row = material.filled_constants(law), history_row(space, law)
-    start = wp.array([row(*law.start)], dtype=row, device="cpu")
+    start = wp.array([row(*law.start)], dtype=row)
     shape = F.shape[:-2]
-    flat = wp.array(F.reshape(-1, dim, dim).astype(space.numpy), dtype=space.mat, device="cpu")
+    flat = wp.array(F.reshape(-1, dim, dim).astype(space.numpy), dtype=space.mat)
     n = len(flat)
-    out = [wp.zeros(n, dtype=kind, device="cpu") for kind in (space.mat, space.real, space.row(2))]
-    wp.launch(make_point_functions(space, law), n, [flat, start, constants, *out], device="cpu")
+    out = [wp.zeros(n, dtype=kind) for kind in (space.mat, space.real, space.row(2))]
+    wp.launch(make_point_functions(space, law), n, [flat, start, constants, *out])
     P, psi, moduli = (array.numpy().astype(float) for array in out)
     return P.reshape(*shape, dim, dim), psi.reshape(shape), moduli.reshape(*shape, 2)
 
@@ -295,7 +296,7 @@ def remembering_law(material: Remembering, space: Space) -> Law:
 
 
 def vibrating_body(material: Material, name: str, offset: float) -> es.Body:
-    x = (np.stack(np.meshgrid(*[np.arange(4)] * 2, indexing="ij"), -1).reshape(-1, 2) + 0.5) * 0.1
+    x = 0.4 * lattice(2, 4)
     return es.Body(x=x + np.array([offset, 0.0]), volume=0.01, material=material, velocity=-20.0 * (x - 0.2), name=name)
 
 
@@ -326,7 +327,7 @@ def test_history_is_kept_per_body_and_changes_nothing_else():
 
 
 def liquid(rate: np.ndarray) -> es.Body:
-    x = (np.stack(np.meshgrid(*[np.arange(6)] * 2, indexing="ij"), -1).reshape(-1, 2) - 2.5) * 0.1
+    x = 0.6 * lattice(2, 6) - 0.3
     tait = materials.TaitLiquid(density=1000.0, sound_speed=50.0)
     return es.Body(x=x, volume=0.01, material=tait, velocity=x @ rate.T)
 

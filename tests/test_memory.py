@@ -5,6 +5,7 @@ import logging
 import numpy as np
 import pytest
 import warp as wp
+from bodies import block
 
 import warp_eulsph as es
 from warp_eulsph import execution, memory
@@ -12,29 +13,23 @@ from warp_eulsph import execution, memory
 SIDE = {1: 4000, 2: 80, 3: 20}
 
 
-def block(dim):
-    s = (np.arange(SIDE[dim]) + 0.5) / SIDE[dim]
-    x = np.stack(np.meshgrid(*[s] * dim, indexing="ij"), -1).reshape(-1, dim)
-    return es.Body(x=x, volume=float(SIDE[dim]) ** -dim, material=es.NeoHookean(density=1e3, young=1e7, poisson=0.3))
-
-
 @pytest.mark.parametrize("simd", [True, False])
 @pytest.mark.parametrize("dtype", [wp.float32, wp.float64])
 @pytest.mark.parametrize("dim", [1, 2, 3])
 @pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
-def test_estimate_is_near_what_is_allocated(dim, dtype, reference, simd, monkeypatch):
+def test_estimate_is_near_what_is_allocated(dim, dtype, reference, simd, device):
     """Within a fifth: particles at the surface of so small a block have fewer neighbours."""
-    monkeypatch.setattr(execution, "_simd", simd)
-    simulation = es.Simulation(block(dim), reference=reference, arrangement=es.Current(), dtype=dtype)
+    execution.set_simd(simd)
+    simulation = es.Simulation(block(dim, SIDE[dim]), reference=reference, arrangement=es.Current(), dtype=dtype)
     simulation.step(3)
     taken = memory.array_bytes(simulation) / len(simulation.x)
     moving = not reference.fixed
-    expected = memory.bytes_per_particle(simulation.space, 2.6, moving, "cpu")
+    expected = memory.bytes_per_particle(simulation.space, 2.6, moving, device)
     assert 0.8 * taken < expected < 1.2 * taken
 
 
 def test_a_fixed_reference_keeps_no_search_and_finds_its_neighbours_again():
-    simulation = es.Simulation(block(2), reference=es.Never())
+    simulation = es.Simulation(block(2, SIDE[2]), reference=es.Never())
     lists = simulation.configuration.lists
     before = lists.rows.index.numpy().copy(), simulation.configuration.fields.L.numpy().copy()
     searching = memory.array_bytes(lists) - 4 * (len(lists.rows.index) + len(lists.rows.start)) - 8 * len(lists.rows.w)
@@ -49,15 +44,15 @@ def test_a_run_that_does_not_fit_is_refused_with_the_number(monkeypatch):
     with pytest.raises(
         MemoryError, match=r"8000 particles take about [12]\d\d\d bytes each, 0.0\d* GB, and 0.001 GB are"
     ):
-        es.Simulation(block(3))
+        es.Simulation(block(3, SIDE[3]))
 
 
 def test_memory_is_reported_before_the_run(caplog):
     with caplog.at_level(logging.INFO, logger="warp_eulsph.memory"):
-        es.Simulation(block(2))
+        es.Simulation(block(2, SIDE[2]))
     assert "6400 particles take about" in caplog.text
 
 
-def test_available_memory_is_of_this_machine():
-    there = memory.available("cpu")
+def test_available_memory_is_of_this_machine(device):
+    there = memory.available(device)
     assert there is None or 1e7 < there < 1e14

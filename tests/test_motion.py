@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import warp as wp
+from bodies import COMPRESSIBLE
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
@@ -10,7 +11,7 @@ from warp_eulsph.geometry import box
 
 def block():
     x, volume = box((0.0, 0.0), (0.6, 0.6), 0.1)
-    return es.Body(x=x, volume=volume, material=es.NeoHookean(density=1100.0, young=17e6, poisson=0.3))
+    return es.Body(x=x, volume=volume, material=COMPRESSIBLE)
 
 
 @wp.func

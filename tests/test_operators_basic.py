@@ -31,13 +31,13 @@ def jittered(dim, real):
 
 def rows_of(values, configuration):
     kind = configuration.space.row(values.shape[1])
-    return wp.array(values.astype(configuration.space.numpy), dtype=kind, device="cpu")
+    return wp.array(values.astype(configuration.space.numpy), dtype=kind)
 
 
 def gradient(configuration, f):
     """∇f by M4: (n, c) -> (n, c, dim)."""
     space, (n, components) = configuration.space, f.shape
-    out = wp.zeros(n, dtype=space.row_gradient(components), device="cpu")
+    out = wp.zeros(n, dtype=space.row_gradient(components))
     configuration.gradient(rows_of(f, configuration), out)
     return out.numpy().astype(float)
 
@@ -46,8 +46,8 @@ def divergence(configuration, Q):
     """T by M5: (n, dim, dim) -> (n, dim)."""
     space, n = configuration.space, len(Q)
     L = configuration.fields.L.numpy().astype(float)
-    Pi = wp.array((Q @ L).astype(space.numpy), dtype=space.mat, device="cpu")
-    out = wp.zeros(n, dtype=space.vec, device="cpu")
+    Pi = wp.array((Q @ L).astype(space.numpy), dtype=space.mat)
+    out = wp.zeros(n, dtype=space.vec)
     configuration.divergence(Pi, out)
     return -out.numpy().astype(float)
 
@@ -59,7 +59,7 @@ def smooth(configuration, theta, f):
     values = rows_of(f, configuration)
     out = wp.zeros_like(values)
     arguments = [configuration.particles, configuration.fields, configuration.near, theta, values, slopes, out]
-    wp.launch(make_linear_exact(space, components), n, arguments, device="cpu")
+    wp.launch(make_linear_exact(space, components), n, [0, *arguments])
     return out.numpy().astype(float)
 
 
@@ -148,12 +148,12 @@ def test_smoothing_keeps_linear_fields_and_sums(dim, real, tolerance):
 
 def lists_of(x, h, body=None, box=None, real=wp.float64, weight=CubicSpline()):
     """Neighbour lists of a cloud, built."""
-    n, dim = x.shape
+    (n, dim), device = x.shape, wp.get_device()
     space = Space(dim, real, box is not None)
-    lengths = wp.array(np.broadcast_to(h, n).astype(space.numpy), dtype=real, device="cpu")
-    bodies = wp.array(np.zeros(n) if body is None else body, dtype=wp.int32, device="cpu")
-    lists = NeighbourLists(space, weight, lengths, bodies, (0.0,) * dim if box is None else box, "cpu")
-    lists.build(wp.array(x.astype(space.numpy), dtype=space.vec, device="cpu"))
+    lengths = wp.array(np.broadcast_to(h, n).astype(space.numpy), dtype=real)
+    bodies = wp.array(np.zeros(n) if body is None else body, dtype=wp.int32)
+    lists = NeighbourLists(space, weight, lengths, bodies, (0.0,) * dim if box is None else box, device)
+    lists.build(wp.array(x.astype(space.numpy), dtype=space.vec))
     return lists
 
 
@@ -206,7 +206,7 @@ def test_lists_grow_when_the_cloud_is_compressed():
     lists = lists_of(x, 1.3 / 12)
     capacity = lists.capacity
     for scale in (0.5, 1.0):
-        lists.build(wp.array(x * scale, dtype=wp.vec2d, device="cpu"))
+        lists.build(wp.array(x * scale, dtype=wp.vec2d))
         assert pairs_of(lists.rows) == tree_pairs(x * scale, 2.6 / 12)
     assert lists.capacity > 2 * capacity
 

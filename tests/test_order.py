@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from bodies import lattice
 
 import warp_eulsph as es
 from warp_eulsph.geometry import nodes
@@ -32,8 +33,7 @@ def errors(wave, simulation, volume):
 
 def periodic(dim, n, reference, jitter=0.0, scheme=es.Verlet, **options):
     """Errors of the wave extended periodically, n particles per period; jitter in spacings."""
-    q = (np.arange(n) + 0.5) * 4 / n
-    x = np.stack(np.meshgrid(*[q] * dim, indexing="ij"), -1).reshape(-1, dim)
+    x = 4.0 * lattice(dim, n)
     x = x + jitter * 4 / n * np.random.default_rng(0).uniform(-1, 1, x.shape)
     wave, volume = StandingWave(x), np.full(len(x), (4 / n) ** dim)
     surface = 0.0 if jitter else None

@@ -1,5 +1,6 @@
 """Probes measure what they say."""
 
+import bodies
 import numpy as np
 import pytest
 from kept_runs import plate
@@ -8,13 +9,9 @@ import warp_eulsph as es
 from warp_eulsph.output import BodyProbe, PointProbe, ReactionProbe, SectionProbe
 
 
-def block(dim, n=6, **options):
-    """A unit block of rubber with a velocity that is linear in position."""
-    s = (np.arange(n) + 0.5) / n
-    x = np.stack(np.meshgrid(*[s] * dim, indexing="ij"), -1).reshape(-1, dim)
-    x += 0.1 / n * np.random.default_rng(0).uniform(-1, 1, x.shape)
-    rubber = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
-    return es.Body(x=x, volume=n**-dim, material=rubber, **options)
+def block(dim, **options):
+    """A unit block of rubber, jittered."""
+    return bodies.block(dim, 6, jitter=0.1, **options)
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])

@@ -82,14 +82,14 @@ def test_some_fields_only(tmp_path):
     assert run[-1].pressure.shape == (36,)
 
 
-def test_log_probes_and_description(directory):
+def test_log_probes_and_description(directory, device):
     run = Run(directory)
     assert run.log["t"][-1] == UNTIL and run.log["momentum"].shape == (len(run.log["t"]), 2)
     assert run.probe_names == ["corner", "hold", "middle", "whole"]
     assert len(run.probes["corner"]["t"]) == run.steps[-1] + 1
     assert run.probes["corner"].units["v"] == "m/s" and run.probes["hold"].units["t"] == "s"
     assert run.description["simulation"]["dimension"] == 2 and run.state == "done"
-    assert run.environment["sessions"][0]["device"]["kind"] == "cpu"
+    assert run.environment["sessions"][0]["device"]["kind"] == ("cuda" if device.is_cuda else "cpu")
 
 
 def test_comparison_of_two_runs(directory, tmp_path):

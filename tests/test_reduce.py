@@ -13,13 +13,12 @@ from warp_eulsph.reduce import LEAST, MOST_BLOCKS, Sum, SumOfParticles
 @pytest.mark.parametrize("n", [0, 1, LEAST, LEAST + 1, LEAST**2 + 5, 3 * LEAST * MOST_BLOCKS + 7])
 def test_sums_are_right_and_repeatable(n):
     values = np.random.default_rng(n).normal(size=(n, 2))
-    array, out = wp.array(values, dtype=wp.vec2d, device="cpu"), wp.zeros(1, dtype=wp.vec2d, device="cpu")
-    total, threads, found = Sum(wp.vec2d, n, "cpu"), execution.threads(), []
+    array, out = wp.array(values, dtype=wp.vec2d), wp.zeros(1, dtype=wp.vec2d)
+    total, found = Sum(wp.vec2d, n, wp.get_device()), []
     for count in (1, 3):
         execution.set_threads(count)
         total(array, out)
         found.append(out.numpy()[0].copy())
-    execution.set_threads(threads)
     assert np.array_equal(*found)
     np.testing.assert_allclose(found[0], values.sum(axis=0), rtol=0.0, atol=1e-15 * max(np.abs(values).sum(), 1.0))
 
@@ -48,12 +47,10 @@ def _make_squares():
 @pytest.mark.parametrize("n", [1, LEAST, LEAST + 1, 40 * LEAST + 13])
 def test_every_particle_is_in_one_block(n, monkeypatch):
     monkeypatch.setattr(execution, "LEAST_RANGE", 16)
-    x, seen = wp.array(np.arange(n) + 1.0, dtype=wp.float64, device="cpu"), wp.zeros(n, dtype=int, device="cpu")
-    total, out = SumOfParticles(wp.float64, n, "cpu"), wp.zeros(1, dtype=wp.float64, device="cpu")
-    threads = execution.threads()
+    x, seen = wp.array(np.arange(n) + 1.0, dtype=wp.float64), wp.zeros(n, dtype=int)
+    total, out = SumOfParticles(wp.float64, n, wp.get_device()), wp.zeros(1, dtype=wp.float64)
     for count in (1, 3):
         execution.set_threads(count)
         total(_make_squares(), [x, seen], out)
         assert out.numpy()[0] == n * (n + 1) * (2 * n + 1) // 6  # whole numbers: exact in any order
-    execution.set_threads(threads)
     assert (seen.numpy() == 2).all()

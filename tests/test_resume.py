@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER, lattice
 
 import warp_eulsph as es
 from warp_eulsph.boundaries import Bound
@@ -12,7 +13,6 @@ from warp_eulsph.commands.loading import examples, load_case
 from warp_eulsph.output.checkpoint import decode, encode, take
 from warp_eulsph.output.description import describe, differences
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 REFERENCES = [es.Never(), es.Every(3), es.WhenDistorted(1.01), es.Always()]
 SCHEMES = {
     "default": es.Verlet(),
@@ -34,8 +34,7 @@ SCHEMES = {
 def blocks(dim, reference=es.Always(), scheme=es.Verlet(), dtype=wp.float64):
     """Two jittered blocks in shear and stretch: one held and driven, one free and under pressure."""
     n = {1: 9, 2: 9, 3: 4}[dim]  # in 2-D some particles are far enough from the surface to be shifted
-    s = (np.arange(n) + 0.5) / n
-    x = np.stack(np.meshgrid(*[s] * dim, indexing="ij"), -1).reshape(-1, dim)
+    x = lattice(dim, n)
     x += 0.05 / n * np.random.default_rng(3).uniform(-1, 1, x.shape)
     velocity = 60.0 * np.sin(2.0 * np.roll(x, 1, axis=1) + x)
     bodies = [
@@ -124,7 +123,7 @@ def resume_is_exact(build, before, after):
     resumed.restore(stored.arrays, stored.counters)
     resumed.step(after)
     assert bits(resumed) == bits(whole)
-    lists = "simulation.stepper.configuration.lists"
+    lists = "simulation.stepper.media.0.configuration.lists"
     kept = numbers.keys() - {f"{lists}._builds", f"{lists}.cells._stride"}  # room in the lists, not what is in them
     assert all(reachable(resumed)[1][path] == reachable(whole)[1][path] for path in kept)
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
 from warp_eulsph.validation.cases import shear, spinning_plate
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 SHIFTED = es.Verlet(shifting=es.Shifting())
 EVEN = es.Verlet(shifting=es.Shifting())
 

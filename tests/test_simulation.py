@@ -3,17 +3,13 @@
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER, block, lattice
 
 import warp_eulsph as es
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
-
 
 def square(n=6, velocity=0.0, name="body", shift=0.0, **changes):
-    s = (np.arange(n) + 0.5) / n
-    x = np.stack(np.meshgrid(s, s, indexing="ij"), -1).reshape(-1, 2) + shift
-    options = {"x": x, "volume": 1.0 / n**2, "material": RUBBER, "velocity": velocity, "name": name}
-    return es.Body(**{**options, **changes})
+    return block(2, n, **{"x": lattice(2, n) + shift, "velocity": velocity, "name": name, **changes})
 
 
 def test_frames_hit_their_times_exactly():

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER, lattice
 from clouds import cloud
 from kept_runs import StopAfter, contents, killed_until_done
 from test_materials import Remembering
@@ -20,18 +21,9 @@ from warp_eulsph.output.checkpoint import take
 from warp_eulsph.output.stress import cauchy_stress
 from warp_eulsph.schedule import EverySteps
 
-RUBBER = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
 SIDE = {1: 20, 2: 8, 3: 6}
 # Wave speeds hold roots of eigenvalues, of which equal ones lose half of the digits: in M9, M13 and time steps.
 ROUND_OFF = {wp.float32: 1e-3, wp.float64: 1e-7}
-
-
-@pytest.fixture(autouse=True)
-def settings():
-    """Leave them as they were."""
-    before = execution._graphs
-    yield
-    execution.set_graphs(before)
 
 
 def two_blocks(dim=2, *, order=None, conditions=None, material=RUBBER, **options):
@@ -306,6 +298,7 @@ def kept(directory, until=1e-2, **options):
     return record(simulation, directory, until, recording, **options)
 
 
+@pytest.mark.of_the_cpu
 @pytest.mark.skipif(sys.platform == "win32", reason="no fork")
 def test_stops_and_kills_between_sorts_leave_no_trace(tmp_path, monkeypatch):
     sorted_often(monkeypatch)
@@ -383,7 +376,7 @@ def test_room_in_the_lists_does_not_grow_by_sorting(reference):
 
 def test_stirred_liquids_are_sorted_as_they_part(monkeypatch):
     monkeypatch.setattr(sorting, "STEPS_BETWEEN_SORTS", 50)
-    x = (np.stack(np.meshgrid(*[np.arange(12)] * 3, indexing="ij"), -1).reshape(-1, 3) + 0.5) / 12
+    x = lattice(3, 12)
     cubes = {on: stirred_cube(x, 12, sort=on) for on in (True, False)}
     assert np.array_equal(cubes[True].order.places, np.arange(len(x)))
     for cube in cubes.values():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bodies import COMPRESSIBLE, RUBBER
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
@@ -11,8 +12,7 @@ from warp_eulsph.validation.cases.bar import DENSITY, LENGTH, SPEED, YOUNG
 def spinning_plate(n, **options):
     """Unit square of rubber spinning at 105 rad/s."""
     x, volume = box((-0.5, -0.5), (0.5, 0.5), 1 / n)
-    material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45)
-    body = es.Body(x=x, volume=volume, material=material, velocity=105.0 * np.c_[-x[:, 1], x[:, 0]])
+    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=105.0 * np.c_[-x[:, 1], x[:, 0]])
     return es.Simulation(body, **options)
 
 
@@ -52,10 +52,9 @@ def test_no_dissipation_lets_zero_energy_modes_stand():
     x, volume = box((0.0, 0.0), (1.0, 1.0), 1 / n)
     ranks = np.rint(x * n - 0.5)
     velocity = 1e-3 * (-1.0) ** ranks.sum(axis=1)[:, None] * [1.0, 0.0]
-    material = es.NeoHookean(density=1100.0, young=17e6, poisson=0.3)
     left = {}
     for dissipation in (None, es.Upwind()):
-        body = es.Body(x=x, volume=volume, material=material, velocity=velocity)
+        body = es.Body(x=x, volume=volume, material=COMPRESSIBLE, velocity=velocity)
         scheme = es.LaxWendroff(dissipation=dissipation)
         simulation = es.Simulation(body, reference=es.Never(), scheme=scheme, periodic=(1.0, 1.0))
         simulation.step(100)

@@ -30,7 +30,7 @@ def jittered(dim, varied=True):
 def rows(values, real=wp.float64):
     values = np.asarray(values, dtype=float)
     space = Space(1, real)
-    return wp.array(values, dtype=space.row(values.shape[1]), device="cpu")
+    return wp.array(values, dtype=space.row(values.shape[1]))
 
 
 def run(function, f):
@@ -90,11 +90,11 @@ def test_average_keeps_the_value_of_a_particle_with_one_sided_neighbours():
 def second_derivative(configuration, f):
     space, n, components = configuration.space, len(f), f.shape[1]
     field = rows(f, space.real)
-    gradient = wp.zeros(n, dtype=space.row_gradient(components), device="cpu")
+    gradient = wp.zeros(n, dtype=space.row_gradient(components))
     out = wp.zeros_like(field)
     structs = [configuration.fields, configuration.near]
     configuration.gradient(field, gradient)
-    wp.launch(make_second_derivative(space, components), n, [*structs, field, gradient, out], device="cpu")
+    wp.launch(make_second_derivative(space, components), n, [0, *structs, field, gradient, out])
     return out.numpy().copy(), gradient.numpy().reshape(n, components, space.dim).copy()
 
 
@@ -153,7 +153,7 @@ def test_interpolation_follows_the_reference():
     interpolation = configuration.interpolation(Linear())
     assert configuration.interpolation(Linear()) is interpolation
     moved = x @ np.array([[1.05, 0.1], [0.0, 0.95]])
-    state = allocate(configuration.space, "State", len(x), "cpu")
+    state = allocate(configuration.space, "State", len(x), wp.get_device())
     state.x.assign(moved)
     state.F.assign(np.broadcast_to(np.eye(2), (len(x), 2, 2)))
     configuration.refresh(state)

@@ -31,9 +31,9 @@ def make_sample(weight, space):
 
 def sample(weight, space, r):
     """W(r) and g(r) of the library, as float64."""
-    points = wp.array(np.asarray(r), dtype=space.real, device="cpu")
+    points = wp.array(np.asarray(r), dtype=space.real)
     W, g = wp.zeros_like(points), wp.zeros_like(points)
-    wp.launch(make_sample(weight, space), len(points), [points, H, W, g], device="cpu")
+    wp.launch(make_sample(weight, space), len(points), [points, H, W, g])
     return W.numpy().astype(float), g.numpy().astype(float)
 
 

@@ -26,6 +26,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
+from .interactions import Interaction
 from .materials import (
     Bar,
     LinearElastic,
@@ -42,18 +43,21 @@ from .operators.values import Linear, Shepard
 from .order import spatial_order
 from .scheme.arrangement import Arrangement, Convected, Current
 from .scheme.balance import Balance
+from .scheme.base import Scheme
 from .scheme.dissipation import Upwind
 from .scheme.health import UnstableError
 from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff
 from .scheme.limiter import FluxCorrectedTransport
 from .scheme.pair_areas import PairAreas
-from .scheme.reference import Always, Every, Never, ReferencePolicy, WhenDistorted
+from .scheme.policy import Always, Every, Never, ReferencePolicy, WhenDistorted
 from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
 from .scheme.shifting import Shifting
 from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
+from .scheme.stabiliser import Correction
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.tie import Tie
+from .scheme.tilt import Tilt
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
 from .simulation import Body, Simulation
@@ -73,6 +77,7 @@ __all__ = [
     "BrokenError",
     "Clamped",
     "Convected",
+    "Correction",
     "CubicSpline",
     "Current",
     "DimensionlessSensor",
@@ -80,6 +85,7 @@ __all__ = [
     "Fixed",
     "FluxCorrectedTransport",
     "Gravity",
+    "Interaction",
     "Lax",
     "LaxWendroff",
     "Linear",
@@ -103,6 +109,7 @@ __all__ = [
     "Region",
     "Roller",
     "SaintVenantKirchhoff",
+    "Scheme",
     "Sensor",
     "Shepard",
     "Shifting",
@@ -112,6 +119,7 @@ __all__ = [
     "SurfaceVectors",
     "TaitLiquid",
     "Tie",
+    "Tilt",
     "TimeStep",
     "Traction",
     "UnstableError",

@@ -8,14 +8,12 @@ import numpy as np
 import warp as wp
 
 from .body import Body
-from .checks import instance, short
+from .checks import instance, positive, short
 from .overlap import overlaps
 from .scheme.arrangement import Arrangement
-from .scheme.lax import Lax
-from .scheme.lax_wendroff import LaxWendroff
-from .scheme.reference import ReferencePolicy
+from .scheme.base import Scheme
+from .scheme.policy import ReferencePolicy
 from .scheme.time_step import TimeStep
-from .scheme.verlet import Verlet
 from .weights import Weight
 
 log = logging.getLogger(__name__)
@@ -24,14 +22,17 @@ log = logging.getLogger(__name__)
 COARSE_POSITIONS = 1e-4
 
 
-def check_options(reference: Any, arrangement: Any, scheme: Any, time_step: Any, weight: Any, dtype: Any) -> None:
+def check_options(
+    reference: Any, arrangement: Any, scheme: Any, time_step: Any, weight: Any, dilation: Any, dtype: Any
+) -> None:
     """ValueError unless these are what they should be, with what to write instead."""
     checked_dtype(dtype)
     instance(reference, ReferencePolicy, "reference", "Always()")
     instance(arrangement, Arrangement, "arrangement", "Convected()")
-    instance(scheme, (Verlet, LaxWendroff, Lax), "scheme", "Verlet()")
+    instance(scheme, Scheme, "scheme", "Verlet()")
     instance(time_step, TimeStep, "time_step", "TimeStep(cfl=0.7)")
     instance(weight, Weight, "weight", "CubicSpline()")
+    positive(dilation, "dilation", "1.3 is the tested value")
 
 
 def checked_dtype(given: Any) -> Any:

@@ -5,9 +5,21 @@ from typing import Any
 
 import numpy as np
 
-from .checks import real_array, spread
+from .checks import instance, positive, real_array, spread
 from .materials import Material
+from .scheme.arrangement import Arrangement
+from .scheme.base import Scheme
+from .scheme.policy import ReferencePolicy
 from .summary import Rows, as_html, as_text, extent, least_to_largest, mass_unit
+from .weights import Weight
+
+#: Options that a body may have of its own, beside the dilation.
+_OWN: tuple[tuple[str, type, str], ...] = (
+    ("reference", ReferencePolicy, "Never()"),
+    ("arrangement", Arrangement, "Convected()"),
+    ("scheme", Scheme, "Verlet()"),
+    ("weight", Weight, "CubicSpline()"),
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -24,6 +36,8 @@ class Body:
             the defect e_a of the initial arrangement, which on a disordered one is noise inside too. Given vectors make
             M10, M11 and M12 work with a fixed reference as well; without them they are zero there.
         name: for boundary conditions and output.
+        reference, arrangement, scheme, weight, dilation: as in ``Simulation``, whose these are where they are None.
+            Bodies that follow each other and agree in all of them are one medium.
 
     Raises:
         ValueError: wrong shapes, entries that are not finite real numbers, volumes or spacings that are not positive.
@@ -38,6 +52,11 @@ class Body:
     velocity: Any = 0.0
     surface: Any = None
     name: str = "body"
+    reference: ReferencePolicy | None = None
+    arrangement: Arrangement | None = None
+    scheme: Scheme | None = None
+    weight: Weight | None = None
+    dilation: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -60,6 +79,11 @@ class Body:
         self._keep("velocity", self._field("velocity", self.velocity, x.shape))
         if self.surface is not None:
             self._keep("surface", self._field("surface", self.surface, x.shape))
+        for name, kind, example in _OWN:
+            if getattr(self, name) is not None:
+                instance(getattr(self, name), kind, f"body {self.name!r}: {name}", example)
+        if self.dilation is not None:
+            positive(self.dilation, f"body {self.name!r}: dilation", "1.3 is the tested value")
 
     def _keep(self, name: str, values: np.ndarray) -> None:
         """A copy that nobody changes by accident."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from .scheme.health import WELL, UnstableError, last_good
+from .scheme.medium import Medium
 
 log = logging.getLogger(__name__)
 
@@ -65,11 +66,10 @@ def _tear(simulation: Any) -> UnstableError | None:
 
     What flows opens and closes all the time; only a body whose law carries its whole F is meant to hold together.
     """
-    torn = getattr(simulation.stepper.stabiliser, "torn", None)
-    place = WELL if torn is None else int(torn.numpy()[0])
-    if place == WELL:
+    places = [place for medium in simulation.stepper.media if (place := _torn(medium)) is not None]
+    if not places:
         return None
-    particle = int(simulation.order.ids.numpy()[place])
+    particle = int(simulation.order.ids.numpy()[min(places)])
     body = next(body for body in simulation.bodies if particle in simulation.ranges[body.name])
     if body.material.flows:
         return None
@@ -84,16 +84,29 @@ def _tear(simulation: Any) -> UnstableError | None:
     )
 
 
+def _torn(medium: Medium) -> int | None:
+    """Place among all of the first particle of a medium with a new face; reads the device."""
+    torn = getattr(medium.stabiliser, "torn", None)
+    place = WELL if torn is None else int(torn.numpy()[0])
+    return None if place == WELL else medium.span.start + place
+
+
 def where(simulation: Any, particle: int, x: np.ndarray) -> str:
     """Words on a particle's body and place."""
     name = next(name for name, indices in simulation.ranges.items() if particle in indices)
-    return f"of body {name!r} at x = {np.array2string(x[particle], precision=6)} m"
+    return place_of(name, x[particle])
+
+
+def place_of(body: str, x: np.ndarray) -> str:
+    """Words on a body and a place x [m], (dim,)."""
+    return f"of body {body!r} at x = {np.array2string(x, precision=6)} m"
 
 
 def _history(simulation: Any, particle: int) -> str:
-    names = {variable.name for part in simulation.stepper.flux.parts for variable in part.law.history}
+    names = {variable.name for _, part in simulation.stepper.remembering for variable in part.law.history}
     return ", ".join(f"{name} = {simulation.history(name)[particle].tolist()}" for name in sorted(names))
 
 
 def _fastest(simulation: Any) -> int:
-    return int(simulation.order.by_number(simulation.stepper.flux.fields.speed.numpy()).argmax())
+    speeds = [medium.flux.fields.speed.numpy() for medium in simulation.stepper.media]
+    return int(simulation.order.by_number(np.concatenate(speeds)).argmax())

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import warp as wp
 
 from .summary import Rows, as_html, as_text, extent
+from .turns import in_turn
 
 if TYPE_CHECKING:
     from .order import Order
@@ -15,11 +15,13 @@ if TYPE_CHECKING:
 ALL_FORCES = ("internal", "correction", "tie", "dissipation", "external", "reaction")
 
 
+@in_turn()
 class Looks:
     """Fields of a ``Simulation`` in the order of the bodies' particles, copies on the host, and how it is shown."""
 
     bodies: list[Any]
     boundaries: tuple[Any, ...]
+    interactions: tuple[Any, ...]
     space: "Space"
     order: "Order"
     device: Any
@@ -58,10 +60,7 @@ class Looks:
     @property
     def strain_energy_density(self) -> np.ndarray:
         """Stored energy per initial volume Ψ [J/m³], (n,)."""
-        flux, F = self.stepper.flux, self.stepper.U.F
-        stored = wp.empty(len(F), dtype=wp.float64, device=self.device)
-        flux.energy(F, stored)
-        return self.order.by_number(stored.numpy() / self.particles.V0.numpy())
+        return self.order.by_number(self.stepper.ledger.stored_by_particle(self.stepper.U) / self.particles.V0.numpy())
 
     def history(self, name: str) -> np.ndarray:
         """What materials remember under this name, (n,), or (n, 3, 3) of a tensor; NaN in bodies whose law does not.
@@ -69,16 +68,16 @@ class Looks:
         Raises:
             ValueError: no material remembers anything of that name.
         """
-        parts = self.stepper.flux.parts
-        found = [part.law.by_name(part.history.numpy()).get(name) for part in parts]
+        bodies = self.stepper.remembering
+        found = [part.law.by_name(part.history.numpy()).get(name) for _, part in bodies]
         shapes = [values.shape[1:] for values in found if values is not None]
         if not shapes:
-            known = sorted({variable.name for part in parts for variable in part.law.history})
+            known = sorted({variable.name for _, part in bodies for variable in part.law.history})
             raise ValueError(f"history must be one of {known}, which the materials remember, got {name!r}")
         out = np.full((len(self.particles.mass), *shapes[0]), np.nan, dtype=self.space.numpy)
-        for part, values in zip(parts, found, strict=True):
+        for (span, _), values in zip(bodies, found, strict=True):
             if values is not None:
-                out[part.first : part.first + part.size] = values
+                out[span.start : span.stop] = values
         return self.order.by_number(out)
 
     @property
@@ -103,6 +102,7 @@ class Looks:
         return f"Simulation: {particles}, {dim}-D, {self.space.real.__name__} on {self.device}", [
             ("bodies", names),
             ("conditions", conditions),
+            ("interactions", ", ".join(type(each).__name__ for each in self.interactions) or "none"),
             ("time", f"{self.t:.6g} s, step {self.steps}, last one {self.dt:.4g} s"),
             ("extent", extent(self.x)),
             ("volume ratio", f"{extrema['least J']:.4g} … {extrema['largest J']:.4g}"),

@@ -9,27 +9,29 @@ import warp as wp
 from .arguments import check_options, warn
 from .body import Body, checked_bodies
 from .boundaries import Assembly, Boundary
+from .building import Options, check_neighbourhoods, make_particles, make_state, plan_media, ranges_of
 from .checks import check_restorable, checked_box, objects, real_number
 from .diagnostics import Diagnostics
 from .execution import graphs
-from .failure import failure, where
-from .fields import allocate
+from .failure import failure
+from .interactions import Interaction
 from .looks import Looks
 from .memory import check_memory
 from .order import Order
 from .progress import Bar
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.arrangement import Arrangement, Convected
-from .scheme.flux import Flux, check_reference
+from .scheme.base import Scheme
 from .scheme.graphs import StepGraphs, recordable
 from .scheme.health import UnstableError
-from .scheme.lax import Lax
-from .scheme.lax_wendroff import LaxWendroff, is_corrected
-from .scheme.reference import Always, Configuration, Never, ReferencePolicy
+from .scheme.policy import Always, ReferencePolicy
+from .scheme.reference import Configuration
 from .scheme.time_step import DeviceClock, TimeStep
 from .scheme.verlet import Verlet
+from .scheme.world import Parts
 from .sorting import Sorting
 from .space import Space
+from .turns import in_turn
 from .weights import CubicSpline, Weight
 from .whole import Whole
 
@@ -37,13 +39,16 @@ from .whole import Whole
 STEPS_BETWEEN_LOOKS = 8
 
 
+@in_turn("run", "frames", "step", "advance")
 class Simulation(Looks):
     """Runs bodies under conditions with one scheme.
 
     Args:
         bodies: one or several ``Body``; particles of different bodies are never neighbours.
         boundaries: conditions, imposed in this order.
-        reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian.
+        interactions: forces between bodies, or between bodies and what moves beside them.
+        reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian. This,
+            arrangement, scheme, weight and dilation are those of bodies that have none of their own; the step is one.
         arrangement: which bodies a refresh reads anew from their positions: Convected() those that flow, Current() all.
         scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax.
         time_step: TimeStep options.
@@ -66,9 +71,10 @@ class Simulation(Looks):
         bodies: Body | Sequence[Body],
         *,
         boundaries: Sequence[Boundary] = (),
+        interactions: Sequence[Interaction] = (),
         reference: ReferencePolicy = Always(),
         arrangement: Arrangement = Convected(),
-        scheme: Verlet | LaxWendroff | Lax = Verlet(),
+        scheme: Scheme = Verlet(),
         time_step: TimeStep = TimeStep(),
         weight: Weight = CubicSpline(),
         dilation: float = 1.3,
@@ -78,57 +84,38 @@ class Simulation(Looks):
         sort: bool = True,
     ):
         self.bodies = checked_bodies(objects(bodies, Body, "bodies", "Body(...)"))
-        check_options(reference, arrangement, scheme, time_step, weight, dtype)
+        check_options(reference, arrangement, scheme, time_step, weight, dilation, dtype)
         X = np.concatenate([body.x for body in self.bodies])
         self.space = Space(X.shape[1], dtype, periodic is not None)
         self.device = wp.get_device(device)
         self.boundaries = tuple(objects(boundaries, Boundary, "boundaries", "Fixed(lambda X: X[:, 0] < 0.1)"))
-        self.reference, self.arrangement = reference, arrangement
-        check_reference([body.material for body in self.bodies], reference)
-        moving = [not reference.fixed and arrangement.moves(body.material) for body in self.bodies]
-        if not any(moving):
-            reference = Never()
-        if not (np.isfinite(real_number(dilation, "dilation")) and dilation > 0.0):
-            raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
-        self.dilation = dilation
+        self.interactions = tuple(objects(interactions, Interaction, "interactions", "an Interaction"))
+        self.reference, self.arrangement, self.dilation = reference, arrangement, dilation
         box = checked_box(periodic, self.space.dim)
-        check_memory(self.space, len(X), weight.support * dilation, not reference.fixed, self.device)
-        counts = [len(body.x) for body in self.bodies]
-        ends = np.cumsum([0, *counts])
-        self.ranges = {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(self.bodies)}
-        self.particles = self._particles(dilation)
+        self.options = Options(reference, arrangement, scheme, weight, dilation)
+        media = plan_media(self.bodies, self.options)
+        check_memory(self.space, [(each.n, each.reach, each.moves) for each in media], self.device)
+        self.ranges = ranges_of(self.bodies)
+        self.particles = make_particles(self.space, media, self.device)
         self.order = Order(len(X), self.device)
         surface_given = self.bodies[0].surface is not None
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order, surface_given)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
-        materials = [(body.material, len(body.x)) for body in self.bodies]
+        self.bound_interactions = [interaction.bind(assembly) for interaction in self.interactions]
         warn(self.bodies, self.particles.share.numpy() == 0.0, box, self.space.real)
-        flux = Flux(self.space, materials, self.particles, self.device)
-        corrected = is_corrected(scheme, reference, surface_given)
-        configuration = Configuration(
-            self.space,
-            weight,
-            self.particles,
-            box,
-            self.device,
-            moving=[range(ends[i], ends[i + 1]) for i, moves in enumerate(moving) if moves],
-            corrected=corrected,
-        )
         self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
-        U = self._state(X)
         self.stepper = scheme.build(
-            self.space,
-            U,
-            self.particles,
-            flux,
-            configuration,
-            reference,
-            self.clock,
-            self.conditions,
-            surface_given,
-            moving,
+            Parts(
+                space=self.space,
+                U=make_state(self.space, self.bodies, self.device),
+                particles=self.particles,
+                media=[each.build(self.space, self.particles, box, self.device) for each in media],
+                conditions=self.conditions,
+                interactions=self.bound_interactions,
+                clock=self.clock,
+            )
         )
-        self._check_neighbourhoods(X)
+        check_neighbourhoods(self.stepper, self.bodies)
         self.sorting = Sorting(self.stepper, self.order, sort)
         self._graphs: StepGraphs | None = None
         self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
@@ -283,8 +270,8 @@ class Simulation(Looks):
 
     @property
     def configuration(self) -> Configuration:
-        """The configuration in which weights live now."""
-        return self.stepper.configuration
+        """The configuration in which weights live now, of the first medium; ``stepper.media`` has all."""
+        return self.stepper.media[0].configuration
 
     @property
     def x(self) -> np.ndarray:
@@ -310,22 +297,26 @@ class Simulation(Looks):
         """Least and largest volume ratio det F [-], largest speed [m/s] and largest mismatch [spacings]."""
         U = self.stepper.U
         found = dict(zip(("least J", "largest J", "speed"), self.diagnostics.extrema(U), strict=True))
-        return found | {"mismatch": self.diagnostics.mismatch(self.configuration, U)[1]}
+        return found | {"mismatch": self.diagnostics.mismatch(self.stepper.media, U)[1]}
 
     @property
     def mismatch(self) -> np.ndarray:
         """How far positions and F disagree around each particle [spacings], rms of r_ab of its pairs (M16), (n,)."""
-        return self.order.by_number(self.diagnostics.mismatch(self.configuration, self.stepper.U)[0].numpy())
+        return self.order.by_number(self.diagnostics.mismatch(self.stepper.media, self.stepper.U)[0].numpy())
 
     def energy(self) -> dict[str, float]:
-        """Energies [J]: kinetic, stored in strain, in the tie (M16), total, what each mechanism added, the residual."""
+        """Energies [J]: kinetic, stored in strain, in the tie (M16), total, what each mechanism added, the residual.
+
+        Where there are interactions also ``held``, what they hold, and ``interaction``, what they added or dissipated.
+        """
         U, ledger = self.stepper.U, self.stepper.ledger
-        kinetic, stored = ledger.kinetic(U), ledger.stored(U)
+        parts = {"kinetic": ledger.kinetic(U), "stored": ledger.stored(U)}
         accounts = ledger.accounts()
-        tied = -accounts.pop("tie")
-        total = kinetic + stored + tied
-        residual = total - ledger.start - sum(accounts.values())
-        return {"kinetic": kinetic, "stored": stored, "tied": tied, "total": total, **accounts, "residual": residual}
+        parts["tied"] = -accounts.pop("tie")
+        if self.interactions:
+            parts["held"] = ledger.held()
+        total = sum(parts.values())
+        return {**parts, "total": total, **accounts, "residual": total - ledger.start - sum(accounts.values())}
 
     def momentum(self) -> np.ndarray:
         """Linear momentum [kg m/s], (dim,)."""
@@ -342,48 +333,3 @@ class Simulation(Looks):
             raise ValueError(f"reaction: {boundary!r} is not one of the simulation's {len(self.boundaries)} boundaries")
         numbers = self.conditions[self.boundaries.index(boundary)].indices
         return self.stepper.forces.reaction.numpy()[self.order.places[numbers]].sum(axis=0)
-
-    # how it is built
-
-    def _particles(self, dilation: float) -> Any:
-        counts = [len(body.x) for body in self.bodies]
-        volume = np.concatenate([body.volume for body in self.bodies])
-        spacing = np.concatenate([body.spacing for body in self.bodies])
-        density = np.repeat([body.material.density for body in self.bodies], counts)
-        particles = allocate(self.space, "Particles", len(volume), self.device)
-        particles.mass.assign(density * volume)
-        particles.V0.assign(volume)
-        particles.h.assign(dilation * spacing)
-        particles.spacing.assign(spacing)
-        particles.share.fill_(1.0)
-        particles.body.assign(np.repeat(np.arange(len(counts)), counts))
-        return particles
-
-    def _state(self, X: np.ndarray) -> Any:
-        n, dim = X.shape
-        U = allocate(self.space, "State", n, self.device)
-        U.x.assign(X)
-        U.v.assign(np.concatenate([body.velocity for body in self.bodies]))
-        U.F.assign(np.broadcast_to(np.eye(dim), (n, dim, dim)))
-        if self.bodies[0].surface is not None:
-            U.surface.assign(np.concatenate([body.surface for body in self.bodies]))
-        return U
-
-    def _check_neighbourhoods(self, X: np.ndarray) -> None:
-        configuration = self.stepper.configuration
-        nearest = configuration.nearest()
-        close = np.flatnonzero(nearest < 1e-6 * self.particles.spacing.numpy())
-        if close.size:
-            raise ValueError(
-                f"particles of a body must not coincide, got {close.size} with a neighbour closer than 1e-6 spacings; "
-                f"the first is particle {close[0]} {where(self, close[0], X)}; remove duplicates"
-            )
-        poor = np.flatnonzero(configuration.poor.numpy())
-        if poor.size:
-            neighbours = np.diff(configuration.near.start.numpy())[poor[0]]
-            raise ValueError(
-                f"the neighbours of a particle must span all {self.space.dim} directions, {poor.size} particles lack "
-                f"some; the first is particle {poor[0]} {where(self, poor[0], X)} with {neighbours} neighbours within "
-                f"h = {self.particles.h.numpy()[poor[0]]:.6g} m times {configuration.weight.support}; "
-                "increase dilation, check spacing, or use at least 2 particles across each direction"
-            )

@@ -10,8 +10,10 @@ import warp as wp
 
 from .fields import structure
 from .order import Order, spatial_order
-from .scheme.lax_wendroff import LaxWendroffStepper
+from .reduce import SumOfParticles
+from .scheme.medium import Medium
 from .scheme.reference import reference_spacing
+from .scheme.stepper import Stepper
 from .space import Space, difference
 
 log = logging.getLogger(__name__)
@@ -29,7 +31,7 @@ SHORT_ROWS = 0.25
 
 @functools.cache
 def _make_count_parted(space: Space) -> Any:
-    """Kernel: how many particles are far from the one before them, if it is of the same body."""
+    """Kernel of ``SumOfParticles``: how many particles are far from the one before them, if it is of the same body."""
     real, vec, separation = space.real, space.vec, difference(space)
     Particles, Reference, spacing_of = (
         structure(space, "Particles"),
@@ -39,21 +41,46 @@ def _make_count_parted(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def count_parted(
+        first: int,
+        n: int,
+        each: int,
         places: wp.array(dtype=wp.int32),
         particles: Particles,
         reference: Reference,
         box: vec,
-        count: wp.array(dtype=wp.int32),
+        out: wp.array(dtype=wp.int32),
     ):
-        i = wp.tid()
-        a = places[i]
-        b = places[i + 1]
-        spacing = spacing_of(a, particles, reference)
-        far = wp.length(separation(reference.x[b], reference.x[a], box)) > real(APART) * spacing
-        if far and particles.body[a] == particles.body[b]:
-            wp.atomic_add(count, 0, 1)
+        block = first + wp.tid()
+        count = int(0)
+        for i in range(block * each, wp.min((block + 1) * each, n)):
+            a = places[i]
+            b = places[i + 1]
+            spacing = spacing_of(a, particles, reference)
+            far = wp.length(separation(reference.x[b], reference.x[a], box)) > real(APART) * spacing
+            if far and particles.body[a] == particles.body[b]:
+                count += 1
+        out[block] = count
 
     return count_parted
+
+
+class _CountParted:
+    """Counts the parted particles of one medium."""
+
+    def __init__(self, medium: Medium):
+        self.medium, device = medium, medium.device
+        self._places, self._count = (wp.zeros(k, dtype=wp.int32, device=device) for k in (medium.n, 1))
+        self._sum = SumOfParticles(wp.int32, medium.n - 1, device)
+
+    def __call__(self, places: np.ndarray | None) -> int:
+        """How many there are, or were they at these places of the world, (n,); reads the device."""
+        medium, span = self.medium, self.medium.span
+        chosen = np.arange(medium.n) if places is None else places[span.start : span.stop] - span.start
+        self._places.assign(chosen.astype(np.int32))
+        configuration = medium.configuration
+        arguments = [self._places, medium.particles, configuration.fields, configuration.lists.box]
+        self._sum(_make_count_parted(medium.space), arguments, self._count)
+        return int(self._count.numpy()[0])
 
 
 class Sorting:
@@ -69,13 +96,13 @@ class Sorting:
         on: False leaves all where they are.
     """
 
-    def __init__(self, stepper: LaxWendroffStepper, order: Order, on: bool):
+    def __init__(self, stepper: Stepper, order: Order, on: bool):
         self.stepper, self.order = stepper, order
         self.space, self.device = stepper.space, stepper.device
-        self.on = on and all(condition.sortable for condition in stepper.conditions)
+        self.on = on and all(part.sortable for part in (*stepper.conditions, *stepper.interactions))
         if on and not self.on:
-            log.info("particles are not sorted in memory: a condition does not say that it is sortable")
-        self._count = wp.zeros(1, dtype=wp.int32, device=self.device)
+            log.info("particles are not sorted in memory: a condition or interaction does not say that it is sortable")
+        self._counts = [_CountParted(medium) for medium in stepper.media]
         self._in_order = SHORT_ROWS
         if self.on:
             self.look()
@@ -83,7 +110,7 @@ class Sorting:
 
     def steps_left(self, step: int) -> int | None:
         """Steps from step number ``step`` to the next look; None if there is none."""
-        if not self.on or self.stepper.policy.fixed:
+        if not self.on or all(medium.policy.fixed for medium in self.stepper.media):
             return None
         return STEPS_BETWEEN_SORTS - step % STEPS_BETWEEN_SORTS
 
@@ -106,13 +133,7 @@ class Sorting:
     def parted(self, places: np.ndarray | None = None) -> float:
         """Share of the particles that are far from the one before them, in memory or were they at these places, (n,),
         instead; reads the device."""
-        stepper, configuration = self.stepper, self.stepper.configuration
-        chosen = np.arange(stepper.n) if places is None else places
-        self._count.zero_()
-        arguments = [wp.array(chosen, dtype=wp.int32, device=self.device), stepper.particles, configuration.fields]
-        arguments += [configuration.lists.box, self._count]
-        wp.launch(_make_count_parted(self.space), stepper.n - 1, arguments, device=self.device)
-        return int(self._count.numpy()[0]) / stepper.n
+        return sum(count(places) for count in self._counts) / self.stepper.n
 
     def permute(self, places: np.ndarray) -> None:
         """Move the particles at these places, (n,), to the places 0, 1, …, each body within its range.
@@ -127,25 +148,31 @@ class Sorting:
 
     def sorted_places(self) -> np.ndarray:
         """Places in the order that particles should have, each body within its range, (n,)."""
-        stepper, configuration = self.stepper, self.stepper.configuration
-        reference, particles = configuration.fields, stepper.particles
+        return np.concatenate([medium.span.start + self._sorted_places(medium) for medium in self.stepper.media])
+
+    def _sorted_places(self, medium: Medium) -> np.ndarray:
+        """The same of one medium, counted from its first particle."""
+        reference, particles = medium.configuration.fields, medium.particles
         x = reference.x.numpy().astype(float)
-        box = np.array(configuration.lists.box, dtype=float)
+        box = np.array(medium.configuration.lists.box, dtype=float)
         x -= box * np.floor(np.divide(x, box, out=np.zeros_like(x), where=box > 0.0))
         spacing = particles.spacing.numpy() * reference.h.numpy() / particles.h.numpy()
         sorted_bodies = [
             body.start + spatial_order(x[body.start : body.stop], float(np.median(spacing[body.start : body.stop])))
-            for body in stepper.flux.bodies
+            for body in medium.flux.bodies
         ]
         return np.concatenate(sorted_bodies)
 
     def _arrays(self) -> Iterator[tuple[wp.array, range]]:
         """What evolves and has an element for each particle, and the particles that each array is of."""
-        stepper, n = self.stepper, self.stepper.n
-        conditions = [array for condition in stepper.conditions for array in condition.evolving().values()]
-        own = {id(array) for array in conditions}  # they go by number
-        bodies = {id(part.history): range(part.first, part.first + part.size) for part in stepper.flux.parts}
+        stepper = self.stepper
+        parts = (*stepper.conditions, *stepper.interactions)
+        own = {id(array) for part in parts for array in part.evolving().values()}
+        spans: dict[int, range] = {}
+        for medium in stepper.media:
+            spans |= {id(array): medium.span for array in medium.evolving().values()}
+        spans |= {id(part.history): span for span, part in stepper.remembering}
         for array in stepper.evolving().values():
-            body = bodies.get(id(array), range(n))
-            if len(array) == len(body) and id(array) not in own:
-                yield array, body
+            span = spans.get(id(array), range(stepper.n))
+            if len(array) == len(span) and id(array) not in own:  # theirs go by number
+                yield array, span

@@ -9,7 +9,7 @@ import warp as wp
 from ..geometry import box
 from ..materials import Material, NeoHookean
 from ..scheme.arrangement import Current
-from ..scheme.reference import Always, Every, Never, ReferencePolicy
+from ..scheme.policy import Always, Every, Never, ReferencePolicy
 from ..simulation import Body, Simulation
 
 STEPS_PER_REFRESH = 10  # of the mode every_k

@@ -17,7 +17,7 @@ import warp as wp
 from .. import execution
 from ..scheme.health import UnstableError
 from ..scheme.lax_wendroff import LaxWendroff
-from ..scheme.reference import Always, Every, Never
+from ..scheme.policy import Always, Every, Never
 from ..scheme.verlet import Verlet
 from ..simulation import Simulation
 from ..validation.cases import bar, twisting_column

@@ -8,20 +8,23 @@ from pydantic import Field, model_validator
 
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
+from ..building import Options, options_of
 from ..materials import Material
 from ..output import FIELDS, Probe
 from ..scheme.arrangement import Arrangement
-from ..scheme.lax import Lax
-from ..scheme.lax_wendroff import LaxWendroff
-from ..scheme.reference import ReferencePolicy
+from ..scheme.base import Scheme
+from ..scheme.policy import ReferencePolicy
 from ..scheme.time_step import TimeStep
-from ..scheme.verlet import Verlet
 from ..simulation import Body, Simulation
+from ..weights import Weight
 from .expressions import COORDINATES, nearest
 from .options import Table, choice, one_of
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
 from .values import Formula, Number, PlaceFormula
+
+#: What a body may have of its own.
+OWN = "of this body; that of the case where it is left out"
 
 
 class MirrorPlane(Table):
@@ -46,6 +49,11 @@ class BodyTable(Table):
         description="outward area vectors [m^(dim-1)] of the particles, 0 inside; as the shape has them by default",
     )
     mirror: list[MirrorPlane] = Field([], description="planes behind which the body gets mirror ghosts")
+    reference: choice(ReferencePolicy, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    arrangement: choice(Arrangement, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    scheme: choice(Scheme, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    weight: choice(Weight, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    dilation: Number | None = Field(None, gt=0.0, description=OWN)
 
     @property
     def dim(self) -> int:
@@ -64,6 +72,11 @@ class BodyTable(Table):
             velocity=np.broadcast_to(self.velocity.at(x), x.shape),  # one part is for all components
             surface=surface if self.surface is None else np.broadcast_to(self.surface.at(x), x.shape),
             name=name,
+            reference=self.reference.make(),
+            arrangement=self.arrangement.make(),
+            scheme=self.scheme.make(),
+            weight=self.weight.make(),
+            dilation=self.dilation,
         )
 
 
@@ -86,7 +99,7 @@ class Case(Problem):
     boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
-    scheme: choice(Verlet, LaxWendroff, Lax) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
+    scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
     sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
     output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
@@ -100,13 +113,21 @@ class Case(Problem):
     def build(self) -> Simulation:
         """The simulation at its start; raises as ``Problem.build``."""
         bodies, ghosts = [], []
-        weight, space = self.weight.make(), self.space
+        space = self.space
+        defaults = Options(
+            reference=self.reference.make(),
+            arrangement=self.arrangement.make(),
+            scheme=self.scheme.make(),
+            weight=self.weight.make(),
+            dilation=self.dilation,
+        )
         for name, table in self.body.items():
             body = table.build(name)
             for plane in table.mirror:
                 depth = plane.depth
                 if depth is None:
-                    depth = 2.0 * weight.support * self.dilation * float(body.spacing.max())
+                    own = options_of(body, defaults)
+                    depth = 2.0 * own.weight.support * own.dilation * float(body.spacing.max())
                 body, condition = mirror(
                     body, point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()
                 )
@@ -116,12 +137,8 @@ class Case(Problem):
         return Simulation(
             bodies,
             boundaries=[*conditions, *ghosts],
-            reference=self.reference.make(),
-            arrangement=self.arrangement.make(),
-            scheme=self.scheme.make(),
             time_step=self.time_step.make(),
-            weight=weight,
-            dilation=self.dilation,
+            **defaults._asdict(),
             periodic=self.periodic,
             dtype=PRECISIONS[self.precision],
             device=self.device,

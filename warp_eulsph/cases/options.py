@@ -32,9 +32,6 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from ..geometry import Patch
-from ..scheme.balance import Balance
-from ..scheme.pair_areas import PairAreas
-from ..scheme.surface_vectors import SurfaceVectors
 from .values import Formula, Number, PathText, PlaceTimeFormula, Whole, ZoneFormula, reading
 
 
@@ -145,8 +142,6 @@ def _written(name: str, hint: Any) -> Any:
         return Zone | None
     if name in ("value", "displacement"):
         return PlaceTimeFormula
-    if name == "correction":
-        return choice(Balance, SurfaceVectors, PairAreas, optional=True)
     if name == "boundary":
         return Whole  # which of the case's conditions, from 0
     members = typing.get_args(hint) if typing.get_origin(hint) in (Union, types.UnionType) else (hint,)

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..output import TRANSPORT_FIELDS
-from ..scheme.scalar import ConservationLaw, LinearAdvection, Scheme
+from ..scheme.scalar import ConservationLaw, LinearAdvection, ScalarScheme
 from ..transport import Transport
 from .expressions import COORDINATES
 from .options import Table, Zone, choice, made, one_of
@@ -43,7 +43,7 @@ class TransportCase(Problem):
     """
 
     transport: TransportTable
-    scheme: choice(Scheme) = Field("TwoStepLaxWendroff", validate_default=True)  # type: ignore[valid-type]
+    scheme: choice(ScalarScheme) = Field("TwoStepLaxWendroff", validate_default=True)  # type: ignore[valid-type]
     output: TransportOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     time_step: Number = Field(gt=0.0, description="length of the steps [s]; CFL number = velocity time_step/spacing")
 

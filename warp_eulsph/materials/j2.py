@@ -30,7 +30,7 @@ class J2(Isotropic):
     """Hencky's elasticity Ψ = κ/2 (ln J)² + μ |dev e|², e = ln V_e, that yields where von Mises' √(3/2) |dev τ| = y.
 
     A step that ends outside of the yield surface returns to it along the deviatoric strain, so that plastic flow keeps
-    volume exactly (M17, M18 in docs/method.md, §8). In 2-D and 1-D the strains across are zero in sum; their elastic
+    volume exactly (M18, M19 in docs/method.md, §8). In 2-D and 1-D the strains across are zero in sum; their elastic
     and plastic parts are not. Its history: ``plastic_metric``, ``plastic_strain``, ``plastic_work``, and
     ``temperature`` where the hardening heats.
 

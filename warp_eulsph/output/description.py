@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ..body import Body
+from ..building import Options
 from ..simulation import Simulation
 from ..transport import Transport
 from .describer import Describer
@@ -46,19 +48,32 @@ def _transport(transport: Transport) -> dict[str, Any]:
 def _solids(simulation: Simulation) -> dict[str, Any]:
     stepper = simulation.stepper
     conditions = zip(simulation.boundaries, simulation.conditions, strict=True)
+    exchanges = zip(simulation.interactions, simulation.bound_interactions, strict=True)
+    interactions = {
+        str(i): {**plain(interaction), "particles": plain(bound.indices)}
+        for i, (interaction, bound) in enumerate(exchanges)
+    }
     return {
+        **({"interactions": interactions} if interactions else {}),
         "scheme": plain(stepper.options),
         "reference": plain(simulation.reference),
         "arrangement": plain(simulation.arrangement),
         "time_step": plain(simulation.clock.option),
         "dilation": simulation.dilation,
         "sort": simulation.sorting.on,
-        "bodies": {body.name: plain(body) for body in simulation.bodies},
+        "bodies": {body.name: _body(body) for body in simulation.bodies},
         "boundaries": {
             str(i): {**plain(boundary), "particles": plain(condition.indices)}
             for i, (boundary, condition) in enumerate(conditions)
         },
     }
+
+
+def _body(body: Body) -> dict[str, Any]:
+    """A body, with those options that it has of its own."""
+    options: dict[str, Any] = plain(body)
+    own = {name for name in Options._fields if getattr(body, name) is not None}
+    return {name: value for name, value in options.items() if name in own or name not in Options._fields}
 
 
 def plain(value: Any) -> Any:

@@ -101,7 +101,7 @@ def source(name: str, simulation: Recorded) -> wp.array | np.ndarray:
 
 def history_fields(simulation: Simulation) -> dict[str, SnapshotField]:
     """What the materials of a simulation remember, as fields; NaN in bodies whose law does not."""
-    variables = [variable for part in simulation.stepper.flux.parts for variable in part.law.history]
+    variables = [variable for _, part in simulation.stepper.remembering for variable in part.law.history]
     return {variable.name: _remembered(variable) for variable in variables}
 
 

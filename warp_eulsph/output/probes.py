@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 
 from ..boundaries import Boundary
+from ..building import options_of
 from ..diagnostics import BodySums, SectionForce
 from ..schedule import EverySteps, Schedule
 from ..scheme.flux import Part
@@ -96,7 +97,9 @@ class PointProbe(Probe):
             x, v, F = (array[places].contiguous() for array in (U.x, U.v, U.F))
             history = part.history
             if part.law.history:
-                own = wp.array(places.numpy() - part.first, dtype=wp.int32, device=simulation.device)
+                own = wp.array(
+                    places.numpy() - simulation.ranges[body.name].start, dtype=wp.int32, device=simulation.device
+                )
                 history = history[own].contiguous()
             body_stress(space, body.material, range(len(near)), F, history, stress)
             fields = {"x": x, "v": v, "F": F, "cauchy_stress": stress}
@@ -195,14 +198,14 @@ def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
 
 
 def _part(probe: Probe, simulation: Simulation, name: str | None) -> Part:
-    return simulation.stepper.flux.parts[simulation.bodies.index(_body(probe, simulation, name))]
+    own = simulation.ranges[_body(probe, simulation, name).name]
+    return next(part for span, part in simulation.stepper.remembering if span == own)
 
 
 def _shape_functions(simulation: Simulation, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
-    n, weight = len(body.x), simulation.stepper.configuration.weight
-    h, volume = (np.broadcast_to(given, n) for given in (simulation.dilation * body.spacing, body.volume))
-    functions = shape_functions(X[None, :], body.x, volume, h, weight)
+    options = options_of(body, simulation.options)
+    functions = shape_functions(X[None, :], body.x, body.volume, options.dilation * body.spacing, options.weight)
     if not functions.inside[0]:
         raise ValueError(
             f"probe {name!r}: X = {X.tolist()} m must lie in body {body.name!r}, whose particles lie in "

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import launch
 from ..linalg import det
 from ..materials import Law, Material
 from ..materials.base import history_row, long_form
@@ -18,32 +19,33 @@ def _make_cauchy(space: Space, full: Space, law: Law) -> Any:
     """Kernel: σ of F in the space of the simulation, by a law in ``full`` dimensions with missing stretches of one."""
     real, mat, Constants = space.real, space.mat, law.Constants
     mat33, dim, full_dim, full_mat = matrix_type(3, 3, space.real), space.dim, full.dim, full.mat
-    P_of, determinant, row, remembers = (
-        long_form(full, law).stress,
-        det(full),
-        history_row(full, law),
-        bool(law.history),
-    )
+    P_of, determinant = long_form(full, law).stress, det(full)
+    row, remembers = history_row(full, law), bool(law.history)
 
     @wp.kernel(module="unique", enable_backward=False)
     def cauchy(
-        first: int, F: wp.array(dtype=mat), history: wp.array(dtype=row), c: Constants, sigma: wp.array(dtype=mat33)
+        first: int,
+        begin: int,
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        c: Constants,
+        sigma: wp.array(dtype=mat33),
     ):
-        i = wp.tid()
-        F_i = F[first + i]
+        a = first + wp.tid()
+        F_a = F[a]
         G = wp.identity(n=wp.static(full_dim), dtype=real)
         for j in range(wp.static(dim)):
             for k in range(wp.static(dim)):
-                G[j, k] = F_i[j, k]
+                G[j, k] = F_a[j, k]
         h = row()
         if wp.static(remembers):
-            h = history[i]
+            h = history[a - begin]
         stress = P_of(G, full_mat(), h, real(0.0), c) @ wp.transpose(G) / determinant(G)
         out = mat33()
         for j in range(wp.static(full_dim)):
             for k in range(wp.static(full_dim)):
                 out[j, k] = stress[j, k]
-        sigma[first + i] = out
+        sigma[a] = out
 
     return cauchy
 
@@ -60,8 +62,8 @@ def body_stress(space: Space, material: Material, body: range, F: wp.array, hist
         # A law of fewer dimensions only, a bar: uniaxial stress, the components it does not give are zero.
         full = Space(space.dim, space.real)
         law = material.law(full)
-    arguments = [body.start, F, history, material.filled_constants(law), sigma]
-    wp.launch(_make_cauchy(Space(space.dim, space.real), full, law), len(body), arguments, device=F.device)
+    kernel = _make_cauchy(Space(space.dim, space.real), full, law)
+    launch(kernel, len(body), [body.start, F, history, material.filled_constants(law), sigma], F.device, body.start)
 
 
 def stresses(space: Space, n: int, device: Any) -> wp.array:
@@ -76,8 +78,8 @@ def stress_array(simulation: Simulation) -> wp.array:
     """
     space, F = simulation.space, simulation.stepper.U.F
     sigma = stresses(space, len(F), simulation.device)
-    for body, part in zip(simulation.bodies, simulation.stepper.flux.parts, strict=True):
-        body_stress(space, body.material, simulation.ranges[body.name], F, part.history, sigma)
+    for body, (span, part) in zip(simulation.bodies, simulation.stepper.remembering, strict=True):
+        body_stress(space, body.material, span, F, part.history, sigma)
     return sigma
 
 

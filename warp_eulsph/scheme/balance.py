@@ -16,9 +16,11 @@ from .dissipation import UpwindForces
 from .flux import Flux
 from .health import WELL
 from .reference import Configuration, reference_spacing
+from .stabiliser import Correction
 
-# Share of the residual that a sweep corrects, by dimension: these take the saw-tooth down fastest without overshooting;
-# what is corrected too far repels in tension, pairs in compression.
+# Share of the residual that a sweep corrects, by dimension: the reciprocal of the largest eigenvalue on a lattice,
+# rounded down (at dilation 1.3, in 1-D at 1.2 too; `python -m warp_eulsph.validation.balance_sweeps`). What is
+# corrected too far repels in tension, pairs in compression.
 RELAXATION = {1: 0.52, 2: 0.75, 3: 0.85}
 
 # A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
@@ -26,7 +28,7 @@ OPENED = 1.0
 
 
 @dataclass(frozen=True)
-class Balance:
+class Balance(Correction):
     """Pair vectors of M4 and M5 from x̂ = x − ½ψ; ψ relaxes to Σ_b ω_ab (ψ_a − ψ_b) = K_a (e_a − s_a) (M13).
 
     M4 stays exact for linear fields, M5 its adjoint: linear and angular momentum and energy are conserved as without
@@ -41,6 +43,8 @@ class Balance:
 
     sweeps: int = 5
     bound: float = 0.25
+    by_body = True
+    has_potentials = True
 
     def __post_init__(self) -> None:
         if self.sweeps < 1:

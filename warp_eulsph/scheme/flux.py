@@ -14,7 +14,8 @@ from ..linalg import det, inverse, largest_shortening
 from ..materials import Law, Material
 from ..materials.base import history_row, long_form
 from ..space import Space
-from .reference import Always, Configuration, Every, ReferencePolicy, resolution
+from .policy import Always, Every, ReferencePolicy
+from .reference import Configuration, resolution
 
 
 @functools.cache
@@ -288,7 +289,7 @@ class Flux:
             self.parts.append(Part(first, count, law, material.filled_constants(law), history))
             first += count
         remembers = any(part.law.history for part in self.parts)
-        empty = ("Pi", "tie") if remembers else ("Pi", "tie", "dissipated")
+        empty = ("Pi", "tie", "drag") if remembers else ("Pi", "tie", "drag", "dissipated")
         self.fields = allocate(space, "Flux", first, device, empty=empty)
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
 
@@ -309,7 +310,7 @@ class Flux:
             row = history_row(self.space, part.law)
             start = wp.array([row(*part.law.start)], dtype=row, device=self.device)
             arguments = [start, part.constants, out]
-            wp.launch(_make_moduli(self.space, part.law), 1, arguments, device=self.device)
+            self._launch.once(_make_moduli(self.space, part.law), 1, arguments)
             found.append((float(out.numpy()[0, 0]), float(out.numpy()[0, 1])))
         return found
 
@@ -326,8 +327,7 @@ class Flux:
             self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
-        """Wave speeds measured in the reference, and the largest rate of waves or strain [1/s] into ``clock.rate``."""
-        clock.rate.zero_()
+        """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
         for part in self.parts:
             arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields]
             kernel = _make_wave_speeds(self.space, part.law, configuration.fixed)

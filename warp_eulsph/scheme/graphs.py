@@ -10,65 +10,65 @@ from typing import Any
 
 import warp as wp
 
-from .lax_wendroff import LaxWendroffStepper
+from .refresh import ByGraph
+from .stepper import Stepper
 
 
-def recordable(stepper: LaxWendroffStepper) -> bool:
+def recordable(stepper: Stepper) -> bool:
     """Whether steps launch kernels only: conditions given as Python functions need the host in every step."""
-    return all(condition.recordable for condition in stepper.conditions)
+    return all(part.recordable for part in (*stepper.conditions, *stepper.interactions))
 
 
 class StepGraphs:
-    """The graphs of one stepper's steps."""
+    """The graphs of one stepper's steps, by the media whose references they refresh."""
 
-    def __init__(self, stepper: LaxWendroffStepper):
+    def __init__(self, stepper: Stepper):
         self.stepper = stepper
-        self._taken: set[bool] = set()
-        self._graphs: dict[bool, Any] = {}
-        self._lists: Any = None  # the graphs are of these lists, which may grow
+        self._by_count = all(medium.policy.by_count for medium in stepper.media)
+        self._taken: set[tuple[int, ...]] = set()
+        self._graphs: dict[tuple[int, ...], Any] = {}
+        self._lists: list[Any] = []  # the graphs are of these lists, which may grow
 
     def take(self, most: int) -> None:
         """Take steps, ``most`` at most, fewer when the target is reached or a particle turns bad."""
-        stepper, clock, lists = self.stepper, self.stepper.clock, self.stepper.configuration.lists
+        stepper, clock = self.stepper, self.stepper.clock
         due = stepper.due(stepper.steps)
         if due not in self._taken:  # by the host: its kernels get compiled, and all it needs allocated
             stepper.step()
             self._taken.add(due)
             return
+        self._forget_old_lists()
         clock.open_batch()
-        launched = 0
+        launched, batch = 0, []
         while due in self._taken:
             wp.capture_launch(self._graph(due))
+            batch.append(due)
             launched += 1
-            if launched == most or not stepper.policy.by_count:
+            if launched == most or not self._by_count:
                 break
             due = stepper.due(stepper.steps + launched)
         taken = clock.taken
         stepper.steps += taken
-        if taken < launched and lists.waiting:
-            lists.make_room()
-            stepper.renew_reference()
-            stepper.advance()
+        if taken < launched and any(medium.configuration.lists.waiting for medium in stepper.media):
+            stepper.finish_refresh(batch[taken])
+            stepper.move_on()
             stepper.steps += 1
 
-    def _graph(self, due: bool) -> Any:
-        rows = self.stepper.configuration.near
-        if self._lists is not rows.index:
+    def _forget_old_lists(self) -> None:
+        lists = [medium.configuration.near.index for medium in self.stepper.media]
+        if len(lists) != len(self._lists) or any(a is not b for a, b in zip(lists, self._lists, strict=True)):
             self._graphs.clear()
-            self._lists = rows.index
+            self._lists = lists
+
+    def _graph(self, due: tuple[int, ...]) -> Any:
         if due not in self._graphs:
             with wp.ScopedCapture(self.stepper.device) as capture:
                 self._record(due)
             self._graphs[due] = capture.graph
         return self._graphs[due]
 
-    def _record(self, due: bool) -> None:
+    def _record(self, due: tuple[int, ...]) -> None:
         stepper, running = self.stepper, self.stepper.clock.fields.running
-        lists = stepper.configuration.lists
         if due:
-            wp.capture_if(running, stepper.move_reference)
-            # By itself, because it allocates, which a branch of a CUDA graph may not; repeating it changes nothing
-            lists.sum_counts()
-            lists.check_room(running)
-            wp.capture_if(running, stepper.renew_reference)
-        wp.capture_if(running, stepper.advance)
+            stepper.refresh(due, ByGraph(running))
+        wp.capture_if(running, stepper.move_on)

@@ -6,17 +6,19 @@ from typing import Any, ClassVar
 
 import warp as wp
 
-from ..fields import clock_structure, structure
+from ..fields import clock_structure, part_of, structure
 from ..space import Space
 from .balance import Balance
+from .base import Scheme
 from .dissipation import Upwind
-from .health import check
-from .lax_wendroff import LaxWendroffStepper
 from .smoothing import NeighbourAverage, Smoothing
+from .stabiliser import Correction
+from .stepper import Stepper
+from .world import Parts
 
 
 @dataclass(frozen=True)
-class Lax:
+class Lax(Scheme):
     """U^{n+1} = S(Uⁿ) + Δt (rates of Uⁿ): every step smooths, so that it damps strongly, more so the smaller Δt is.
 
     Args:
@@ -28,15 +30,12 @@ class Lax:
 
     smoothing: Smoothing = NeighbourAverage()
     dissipation: Upwind | None = Upwind()
-    correction: Any = Balance()
-    limiter: ClassVar[None] = None
-    shifting: ClassVar[None] = None
-    tie: ClassVar[None] = None
+    correction: Correction | None = Balance()
     cfl: ClassVar[float] = 0.4
 
-    def build(self, *parts: Any) -> "LaxStepper":
-        """The scheme at work; ``parts`` are the arguments of the stepper after its options."""
-        return LaxStepper(self, *parts)
+    def build(self, parts: Parts) -> "LaxStepper":
+        """The scheme at work."""
+        return LaxStepper(self, parts)
 
 
 @functools.cache
@@ -45,8 +44,8 @@ def _make_note(space: Space) -> Any:
     vec = space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
-    def note(v: wp.array(dtype=vec), smoothed: wp.array(dtype=vec), dv: wp.array(dtype=vec)):
-        a = wp.tid()
+    def note(first: int, v: wp.array(dtype=vec), smoothed: wp.array(dtype=vec), dv: wp.array(dtype=vec)):
+        a = first + wp.tid()
         dv[a] = smoothed[a] - v[a]
 
     return note
@@ -59,8 +58,8 @@ def _make_adopt(space: Space) -> Any:
     State, Clock = structure(space, "State"), clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def adopt(clock: Clock, state: State, other: State, dv: wp.array(dtype=vec)):
-        a = wp.tid()
+    def adopt(first: int, clock: Clock, state: State, other: State, dv: wp.array(dtype=vec)):
+        a = first + wp.tid()
         if clock.dt[0] == wp.float64(0.0):
             other.v[a] = state.v[a]
             dv[a] = vec()
@@ -82,12 +81,13 @@ def _make_adopt(space: Space) -> Any:
     return adopt
 
 
-class LaxStepper(LaxWendroffStepper):
-    """The scheme at work; all parts but the step itself are those of Lax-Wendroff."""
+class LaxStepper(Stepper):
+    """One-step Lax at work."""
 
-    def __init__(self, options: Lax, *parts: Any):
-        super().__init__(options, *parts)
+    def __init__(self, options: Lax, parts: Parts):
+        super().__init__(options, parts)
         self.dv = wp.zeros(self.n, dtype=self.space.vec, device=self.device)
+        self._dv_by_medium = [part_of(self.dv, medium.span) for medium in self.media]
 
     def advance(self) -> None:
         """Advance U on the present reference."""
@@ -96,7 +96,7 @@ class LaxStepper(LaxWendroffStepper):
         self._choose_dt(U)
         self._sense(U)  # d of M9
         self._stress(U, 0.0)  # M1: Q = P F_kᵀ / J_k
-        self._sum_forces(U, U.v, 0.0)  # M5, M9
+        self._sum_forces(U, U, 0.0)  # M5, M9
         self._smooth(U, other)  # M6 or M7: S(U)
         self._note_smoothing(U, other)
         self._predict(U, other, 1.0)  # U^{n+1} = S(Uⁿ) + Δt (rates of Uⁿ), x^{n+1} = xⁿ + Δt vⁿ
@@ -104,12 +104,12 @@ class LaxStepper(LaxWendroffStepper):
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
         self._update(U)  # histories; liquids keep J only
-        check(self._launch, self.space, U, self.clock.fields)
-        self.ledger.record(U, other, self.grad_v, self.forces, self.dv)
+        self._check(U)
+        self.ledger.record(U, other, self._dv_by_medium)
         self.clock.tick()
 
     def _note_smoothing(self, U: Any, other: Any) -> None:
-        wp.launch(_make_note(self.space), self.n, [U.v, other.v, self.dv], device=self.device)
+        self._launch(_make_note(self.space), self.n, [U.v, other.v, self.dv])
 
     def _adopt(self, U: Any, other: Any) -> None:
-        wp.launch(_make_adopt(self.space), self.n, [self.clock.fields, U, other, self.dv], device=self.device)
+        self._launch(_make_adopt(self.space), self.n, [self.clock.fields, U, other, self.dv])

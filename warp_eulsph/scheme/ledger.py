@@ -1,17 +1,18 @@
 """Where the energy went: one account per mechanism, and the residual that closes the books."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..execution import Launcher
-from ..fields import clock_structure, structure
+from ..fields import clock_structure, part_of, structure
 from ..reduce import Sum, SumOfParticles
 from ..space import Space, matrix_type, vector_type
-from .flux import Flux
-from .reference import Configuration
+from .exchanges import Exchanges
+from .medium import Medium
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
@@ -33,15 +34,58 @@ def _note(space: Space) -> Any:
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool, inelastic: bool) -> Any:
+def _lost(space: Space, inelastic: bool) -> Any:
+    """``wp.func``: energy that the law of a particle dissipated in the step, 0 where none does."""
+    Flux = structure(space, "Flux")
+
+    @wp.func
+    def lost(a: int, flux: Flux) -> wp.float64:
+        if wp.static(inelastic):
+            return wp.float64(flux.dissipated[a])
+        return wp.float64(0.0)
+
+    return lost
+
+
+@functools.cache
+def _powers(space: Space, tied: bool, dragged: bool) -> Any:
+    """``wp.func``: power [W] of the stresses in Q of a particle that are the tie's and the dissipation's."""
+    Flux, precise_mat = structure(space, "Flux"), matrix_type(space.dim, space.dim, wp.float64)
+
+    @wp.func
+    def powers(a: int, flux: Flux, strain_rate: precise_mat) -> wp.vec2d:
+        found = wp.vec2d()
+        if wp.static(tied):
+            found[0] = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
+        if wp.static(dragged):
+            found[1] = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
+        return found
+
+    return powers
+
+
+@functools.cache
+def _work(space: Space) -> Any:
+    """``wp.func``: force · velocity in float64."""
+    vec, precise = space.vec, vector_type(space.dim, wp.float64)
+
+    @wp.func
+    def work(force: vec, v: precise) -> wp.float64:
+        return wp.dot(precise(force), v)
+
+    return work
+
+
+@functools.cache
+def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, inelastic: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
-    The tie's is the power of its force and of its stress, which Q holds and W does not (M16). The material's is what
-    the laws say that they dissipated (``inelastic``).
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
+    where it has a stress (M9). The material's is what the laws say that they dissipated (``inelastic``).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -50,8 +94,8 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool, inela
         structure(space, "State"),
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
-    Flux, note = structure(space, "Flux"), _note(space)
-    precise = vector_type(space.dim, wp.float64)
+    Flux, note, work, lost_of = structure(space, "Flux"), _note(space), _work(space), _lost(space, inelastic)
+    precise, powers = vector_type(space.dim, wp.float64), _powers(space, tied, dragged)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -83,17 +127,11 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool, inela
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
-            strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate)
-            tie = wide(0.0)
-            if wp.static(tied):
-                tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
-                strain_power -= tied_power
-                tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
-            lost = wide(0.0)
-            if wp.static(inelastic):
-                lost = wide(flux.dissipated[a])
-            lag = v_mean - precise(half.v[a])
-            stepping = W[a] - W_old[a] + lost - dt * strain_power + dt * wp.dot(precise(forces.internal[a]), lag)
+            of_pairs = powers(a, flux, strain_rate)
+            strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate) - of_pairs[0] - of_pairs[1]
+            lost = lost_of(a, flux)
+            stepping = W[a] - W_old[a] + lost - dt * strain_power
+            stepping += dt * work(forces.internal[a], v_mean - precise(half.v[a]))
             limiter = wide(0.0)
             if wp.static(limited):
                 limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
@@ -101,12 +139,12 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool, inela
             if wp.static(smoothed):
                 stepping += mass * wp.dot(precise(dv[a]), v_mean)
             total += wide(particles.share[a]) * _Entry(
-                dt * wp.dot(precise(forces.external[a]), v_mean),
+                dt * work(forces.external[a], v_mean),
                 wp.dot(impulse, v_mean),
-                dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+                dt * (work(forces.dissipation[a], v_mean) - of_pairs[1]),
                 -lost,
-                dt * wp.dot(precise(forces.correction[a]), v_mean),
-                tie,
+                dt * work(forces.correction[a], v_mean),
+                dt * (work(forces.tie[a], v_mean) - of_pairs[0]),
                 limiter,
                 stepping,
                 wide(0.0),
@@ -155,8 +193,8 @@ def _make_shift_entry(space: Space) -> Any:
 @functools.cache
 def _make_subtract() -> Any:
     @wp.kernel(module="unique", enable_backward=False)
-    def subtract(value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def subtract(first: int, value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         out[a] = value[a] - out[a]
 
     return subtract
@@ -168,8 +206,8 @@ def _make_kinetic(space: Space) -> Any:
     precise = wp.types.vector(length=space.dim, dtype=wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def kinetic(particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def kinetic(first: int, particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         v_a = precise(v[a])
         out[a] = wp.float64(0.5) * wp.float64(particles.share[a] * particles.mass[a]) * wp.dot(v_a, v_a)
 
@@ -182,8 +220,8 @@ def _make_own(space: Space) -> Any:
     Particles = structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def own(particles: Particles, value: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def own(first: int, particles: Particles, value: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         value[a] = value[a] * wp.float64(particles.share[a])
 
     return own
@@ -198,95 +236,141 @@ def _make_book() -> Any:
     return book
 
 
+class _Page:
+    """The books of one medium: what its particles have in the arrays of all."""
+
+    def __init__(self, medium: Medium, v_old: wp.array, W_old: wp.array, W: wp.array, dW_limited: wp.array):
+        self.medium, span = medium, medium.span
+        self.v_old, self.W_old, self.W = (part_of(array, span) for array in (v_old, W_old, W))
+        self.dW_limited = part_of(dW_limited, span)
+        self.sum_entries = SumOfParticles(_Entry, medium.n, v_old.device)
+
+
 class Ledger:
     """Energy accounts on the device, booked every step in float64 and read when asked.
 
-    ``limiter`` is None, or has the velocity change ``dv`` [m/s] that it made in the step, (n,) of vec.
+    What interactions do has an account where there are any: their work on the bodies and what they hold themselves.
     """
 
     def __init__(
         self,
         space: Space,
         particles: Any,
-        flux: Flux,
-        configuration: Configuration,
+        media: Sequence[Medium],
         clock: DeviceClock,
-        limiter: Any,
         device: Any,
+        exchanges: Exchanges | None = None,
     ):
         n = len(particles.mass)
-        self.space, self.particles, self.flux, self.device = space, particles, flux, device
+        self.space, self.particles, self.clock, self.device = space, particles, clock, device
         self._launch = Launcher(device)
-        self.configuration, self.clock, self.limiter = configuration, clock, limiter
+        limited = any(medium.limiter is not None for medium in media)
         self._v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
-        self._dW_limited = wp.zeros(n if limiter is not None else 0, dtype=wp.float64, device=device)
+        self._dW_limited = wp.zeros(n if limited else 0, dtype=wp.float64, device=device)
+        self._pages = [_Page(medium, self._v_old, self._W_old, self._W, self._dW_limited) for medium in media]
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
-        self._energy = wp.zeros(1, dtype=wp.float64, device=device)
-        self._sum_entries, self._sum = SumOfParticles(_Entry, n, device), Sum(wp.float64, n, device)
+        self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self.start, self._most = 0.0, 0.0
+        self._exchanges = exchanges
 
     def open(self, U: Any) -> None:
         """Start the books at state ``U``."""
         wp.copy(self._v_old, U.v)
-        self.flux.energy(U.F, self._W_old)
+        for page in self._pages:
+            page.medium.flux.energy(page.medium.of(U).F, page.W_old)
         self._total.zero_()
-        self.start = self.kinetic(U) + self.stored(U)
+        if self._exchanges is not None:
+            self._exchanges.open()
+        self.start = self.kinetic(U) + self.stored(U) + self.held()
 
     def evolving(self) -> dict[str, wp.array]:
         """The accounts and the end of the last step booked, by name; with ``start`` what a checkpoint must hold."""
-        return {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+        held = {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+        return held if self._exchanges is None else held | self._exchanges.evolving()
 
     def open_limiter(self, U: Any) -> None:
-        """Note the stored energies before the limiter changes ``U``."""
-        self.flux.energy(U.F, self._dW_limited)
+        """Note the stored energies before limiters change ``U``."""
+        for page in self._limited():
+            page.medium.flux.energy(page.medium.of(U).F, page.dW_limited)
 
     def close_limiter(self, U: Any) -> None:
-        """Note what the limiter did to the stored energies."""
-        self.flux.energy(U.F, self._W)
-        wp.launch(_make_subtract(), len(self._W), [self._W, self._dW_limited], device=self.device)
+        """Note what limiters did to the stored energies."""
+        for page in self._limited():
+            page.medium.flux.energy(page.medium.of(U).F, page.W)
+            self._launch(_make_subtract(), len(page.W), [page.W, page.dW_limited])
 
-    def record(self, U: Any, half: Any, grad_v: wp.array, forces: Any, smoothed: wp.array | None = None) -> None:
-        """Book a step that ended in ``U``, with the half state, ∇v^{n+½} and the forces of the full step.
+    def _limited(self) -> list[_Page]:
+        return [page for page in self._pages if page.medium.limiter is not None]
 
-        ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (n,) of vec.
+    def record(self, U: Any, half: Any, smoothed: Sequence[wp.array] | None = None) -> None:
+        """Book a step that ended in ``U``, with the half state; its media have ∇v^{n+½} and the forces.
+
+        ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (particles of the medium,) of vec for each.
         """
-        self.flux.energy(U.F, self._W)
-        arguments = [self.particles, self.configuration.fields, U, half, self.flux.fields, grad_v]
-        dv = smoothed
-        if dv is None:
-            dv = self.limiter.dv if self.limiter is not None else self._v_old
-        arguments += [self._v_old, self._W_old, self._W, dv, self._dW_limited]
-        arguments += [self.clock.fields, forces]
-        tied, inelastic = len(self.flux.fields.tie) > 0, len(self.flux.fields.dissipated) > 0
-        kernel = _make_entries(self.space, tied, self.limiter is not None, smoothed is not None, inelastic)
-        self._book(kernel, arguments)
+        if self._exchanges is not None:
+            self._exchanges.record(U, self._v_old, self._total, ACCOUNTS.index("external"))
+        for k, page in enumerate(self._pages):
+            medium, limiter = page.medium, page.medium.limiter
+            flux = medium.flux
+            flux.energy(medium.of(U).F, page.W)
+            arguments = [medium.particles, medium.configuration.fields, medium.of(U), medium.of(half)]
+            dv = page.v_old if limiter is None else limiter.dv
+            if smoothed is not None:
+                dv = smoothed[k]
+            arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
+            arguments += [self.clock.fields, medium.forces]
+            tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
+            inelastic = len(flux.fields.dissipated) > 0
+            kernel = _make_entries(self.space, tied, dragged, limiter is not None, smoothed is not None, inelastic)
+            self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
-        self.flux.energy(U.F, self._W)
-        self._book(_make_shift_entry(self.space), [self.particles, U, self._v_old, self._W_old, self._W])
+        for page in self._pages:
+            medium = page.medium
+            medium.flux.energy(medium.of(U).F, page.W)
+            arguments = [medium.particles, medium.of(U), page.v_old, page.W_old, page.W]
+            self._book(page, _make_shift_entry(self.space), arguments)
 
-    def _book(self, kernel: Any, arguments: list[Any]) -> None:
-        self._sum_entries(kernel, arguments, self._step)
+    def _book(self, page: _Page, kernel: Any, arguments: list[Any]) -> None:
+        page.sum_entries(kernel, arguments, self._step)
         self._launch.once(_make_book(), 1, [self._step, self._total])
 
     def kinetic(self, U: Any) -> float:
         """Kinetic energy [J]; reads the device."""
-        wp.launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W], device=self.device)
+        self._launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
+
+    def stored_by_particle(self, U: Any) -> np.ndarray:
+        """Stored energy [J] of each particle, by place, (n,); reads the device."""
+        self._store(U)
+        return self._W.numpy().copy()
+
+    def _store(self, U: Any) -> None:
+        for page in self._pages:
+            page.medium.flux.energy(page.medium.of(U).F, page.W)
 
     def stored(self, U: Any) -> float:
         """Stored energy [J]; reads the device."""
-        self.flux.energy(U.F, self._W)
-        wp.launch(_make_own(self.space), len(self._W), [self.particles, self._W], device=self.device)
+        self._store(U)
+        self._launch(_make_own(self.space), len(self._W), [self.particles, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
+    def held(self) -> float:
+        """Energy that interactions hold [J]; reads the device."""
+        return 0.0 if self._exchanges is None else self._exchanges.held()
+
+    def exchanged(self) -> list[float]:
+        """Energy that each interaction added since the start [J], with what it holds; reads the device."""
+        return [] if self._exchanges is None else self._exchanges.accounts()
+
     def accounts(self) -> dict[str, float]:
-        """Energy that each mechanism added since the start [J]; reads the device."""
-        return dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+        """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
+        found = dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+        return found | ({} if self._exchanges is None else {"interaction": sum(self.exchanged())})
 
     def made(self) -> float:
         """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""
@@ -297,4 +381,4 @@ class Ledger:
 
     def residual(self, U: Any) -> float:
         """Energy that no account explains [J]; round-off if the operators are duals of each other."""
-        return self.kinetic(U) + self.stored(U) - self.start - sum(self.accounts().values())
+        return self.kinetic(U) + self.stored(U) + self.held() - self.start - sum(self.accounts().values())

@@ -2,14 +2,12 @@
 
 import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from ..boundaries import Bound
 from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import inverse
@@ -52,10 +50,10 @@ class Shifting:
             )
 
     def build(
-        self, space: Space, particles: Any, flux: Flux, moving: list[range], conditions: Sequence[Bound], device: Any
+        self, space: Space, particles: Any, flux: Flux, moving: list[range], held: np.ndarray, device: Any
     ) -> "Shifter":
-        """Allocate."""
-        return Shifter(self, space, particles, flux, moving, conditions, device)
+        """Allocate; ``held`` are places of particles that stay, (k,)."""
+        return Shifter(self, space, particles, flux, moving, held, device)
 
 
 @functools.cache
@@ -76,6 +74,7 @@ def _make_shift(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(
+        first: int,
         particles: Particles,
         reference: Reference,
         clock: Clock,
@@ -90,7 +89,7 @@ def _make_shift(space: Space) -> Any:
         impulse: wp.array(dtype=vec),
         couple: wp.array(dtype=wp.vec3d),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         delta = psi[a] * (real(0.5) * rate)
         length = wp.length(delta)
         most = bound * particles.spacing[a] * reference.h[a] / particles.h[a]
@@ -122,8 +121,8 @@ def _make_push(space: Space) -> Any:
     vec, Particles = space.vec, structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def push(particles: Particles, impulse: wp.array(dtype=vec), v: wp.array(dtype=vec)):
-        a = wp.tid()
+    def push(first: int, particles: Particles, impulse: wp.array(dtype=vec), v: wp.array(dtype=vec)):
+        a = first + wp.tid()
         v[a] = v[a] + impulse[a] / particles.mass[a]
 
     return push
@@ -180,11 +179,11 @@ class Shifter:
         particles: Any,
         flux: Flux,
         moving: list[range],
-        conditions: Sequence[Bound],
+        held: np.ndarray,
         device: Any,
     ):
         self.option, self.space, self.particles, self.device = option, space, particles, device
-        n = len(particles.mass)
+        n, self._launch = len(particles.mass), Launcher(device)
         self._moved = wp.zeros(n, dtype=space.vec, device=device)
         starts = {body.start for body in moving}
         remembering = [part for part in flux.parts if part.law.history and part.first in starts]
@@ -192,9 +191,7 @@ class Shifter:
         free = np.zeros(n, dtype=np.int32)
         for body in moving:
             free[body.start : body.stop] = 1
-        for condition in conditions:
-            if type(condition).impose is not Bound.impose:
-                free[condition.indices] = 0
+        free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
         self.projection = Projection(space, particles, flux.bodies, device)
@@ -209,10 +206,9 @@ class Shifter:
         """Shift the particles of ``U``, whose gradients in the reference are given; ψ [m] are its potentials (M13)."""
         option, n, reference = self.option, len(psi), configuration.fields
         arguments = [self.particles, reference, clock, psi, self.free, grad_v, grad_F, option.rate, option.bound, U]
-        arguments += [self._moved]
-        arguments += [self.impulse, self.projection.couples]
-        wp.launch(_make_shift(self.space), n, arguments, device=self.device)
+        arguments += [self._moved, self.impulse, self.projection.couples]
+        self._launch(_make_shift(self.space), n, arguments)
         for remap in self._remaps:
             remap(configuration, self._moved)
         self.projection(U.x, self.impulse)
-        wp.launch(_make_push(self.space), n, [self.particles, self.impulse, U.v], device=self.device)
+        self._launch(_make_push(self.space), n, [self.particles, self.impulse, U.v])

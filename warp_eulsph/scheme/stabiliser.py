@@ -5,7 +5,22 @@ from typing import Any, ClassVar
 
 import warp as wp
 
+from ..space import Space
+from .flux import Flux
 from .reference import Configuration
+
+
+class Correction(ABC):
+    """What makes arrangements stable that move with the reference: options; ``build`` makes the part that acts."""
+
+    #: It can act on those bodies alone whose arrangement moves, beside others that keep theirs.
+    by_body: ClassVar[bool] = False
+    #: Its stabiliser has potentials ``psi``, (n,) of vec, that shifting (M15) follows.
+    has_potentials: ClassVar[bool] = False
+
+    @abstractmethod
+    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "Stabiliser":
+        """Allocate for the bodies of ``flux``, of which those in ``moving`` have arrangements that move."""
 
 
 class Stabiliser(ABC):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..materials import NeoHookean
-from ..scheme.reference import Always, Every, Never, ReferencePolicy
+from ..scheme.policy import Always, Every, Never, ReferencePolicy
 from ..simulation import Simulation
 
 #: Nearly incompressible rubber of the literature's large-strain examples; plane strain in 2-D.

@@ -23,7 +23,7 @@ from ..scheme.balance import Balance
 from ..scheme.dissipation import Upwind
 from ..scheme.lax_wendroff import LaxWendroff
 from ..scheme.pair_areas import PairAreas
-from ..scheme.reference import Always
+from ..scheme.policy import Always
 from ..scheme.smoothing import LinearExact, NeighbourAverage
 from ..scheme.verlet import Verlet
 from ..weights import CubicSpline, QuinticSpline, Weight, WendlandC2, WendlandC4

@@ -18,7 +18,7 @@ from ..geometry import box
 from ..materials import Material, NeoHookean
 from ..scheme.arrangement import Current
 from ..scheme.lax_wendroff import LaxWendroff
-from ..scheme.reference import Always, Never, ReferencePolicy
+from ..scheme.policy import Always, Never, ReferencePolicy
 from ..scheme.time_step import TimeStep
 from ..scheme.verlet import Verlet
 from ..simulation import Body, Simulation
@@ -171,6 +171,7 @@ class Step:
             for field in (particles.h, particles.spacing):
                 field.assign(field.numpy() / volume ** (1.0 / point.dim))
             configuration.refresh(stepper.U)
+        simulation.clock.ask()
         flux.wave_speeds(stepper.U.F, stepper.grad_v, configuration, simulation.clock.fields)
         self.speed = float(flux.fields.speed.numpy().max())
         self.dt = point.cfl / float(simulation.clock.fields.rate.numpy()[0])

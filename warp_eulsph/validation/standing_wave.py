@@ -18,7 +18,7 @@ from ..materials import LinearElastic
 from ..output import Figure
 from ..output.stress import cauchy_stress
 from ..scheme.arrangement import Current
-from ..scheme.reference import Always, ReferencePolicy
+from ..scheme.policy import Always, ReferencePolicy
 from ..simulation import Body, Simulation
 from ..weights import CubicSpline
 from .figures import difference, order

@@ -16,7 +16,7 @@ import warp as wp
 
 from ..scheme.health import UnstableError
 from ..scheme.lax_wendroff import LaxWendroff
-from ..scheme.reference import Always, Never, ReferencePolicy
+from ..scheme.policy import Always, Never, ReferencePolicy
 from ..scheme.smoothing import LinearExact
 from ..scheme.time_step import TimeStep
 from ..scheme.verlet import Verlet

@@ -11,7 +11,7 @@ from ...output import Figure
 from ...scheme.arrangement import Current
 from ...scheme.lax_wendroff import LaxWendroff
 from ...scheme.limiter import FluxCorrectedTransport
-from ...scheme.reference import Always, ReferencePolicy
+from ...scheme.policy import Always, ReferencePolicy
 from ...scheme.sensor import DimensionlessSensor
 from ...simulation import Body, Simulation
 from ..case import Case

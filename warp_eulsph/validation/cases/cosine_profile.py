@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...output import Figure
-from ...scheme.scalar import ConservationLaw, LinearAdvection, OneStepLax, Scheme, TwoStepLaxWendroff
+from ...scheme.scalar import ConservationLaw, LinearAdvection, OneStepLax, ScalarScheme, TwoStepLaxWendroff
 from ..case import Case
 from ..figures import order, rms
 
@@ -38,7 +38,7 @@ def profile(x: np.ndarray, centre: float) -> np.ndarray:
     return np.where(away <= 0.12, 0.5 * (1.0 + np.cos(np.pi * away / 0.12)), 0.0)
 
 
-def solve(scheme: Scheme, dilation: float, cfl: float) -> tuple[np.ndarray, np.ndarray]:
+def solve(scheme: ScalarScheme, dilation: float, cfl: float) -> tuple[np.ndarray, np.ndarray]:
     """Positions in ]0, 1[ and the solution there at t = 0.6."""
     dx = 1.0 / PARTICLES
     x = (np.arange(round(BOX / dx)) + 0.5) * dx
@@ -66,7 +66,7 @@ def measure(x: np.ndarray, u: np.ndarray) -> tuple[float, float, float, float]:
     return u.max(), place, u.min(), error
 
 
-def observed_order(scheme: Scheme, cfl: float, levels: Sequence[int]) -> float:
+def observed_order(scheme: ScalarScheme, cfl: float, levels: Sequence[int]) -> float:
     """Order on a smooth profile, a Gaussian of width 0.07 that runs a quarter round the unit circle."""
     errors = []
     for n in levels:

@@ -14,7 +14,7 @@ import numpy as np
 from ...boundaries import Fixed
 from ...geometry import box
 from ...output import Figure
-from ...scheme.reference import Always, ReferencePolicy
+from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..solids import RUBBER

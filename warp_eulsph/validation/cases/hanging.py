@@ -14,7 +14,7 @@ from ...boundaries import BodyForce, Fixed
 from ...geometry import box
 from ...materials import NeoHookean
 from ...output import Figure
-from ...scheme.reference import Always, ReferencePolicy
+from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 

@@ -16,7 +16,7 @@ from ...geometry import box
 from ...materials import NeoHookean
 from ...output import Figure
 from ...scheme.arrangement import Current
-from ...scheme.reference import Always, ReferencePolicy
+from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import difference

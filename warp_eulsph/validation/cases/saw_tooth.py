@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...output import Figure
-from ...scheme.reference import Always, Never
+from ...scheme.policy import Always, Never
 from ...scheme.verlet import Verlet
 from ..case import Case
 from ..stability import CLOSED

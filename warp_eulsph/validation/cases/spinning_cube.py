@@ -8,7 +8,7 @@ import numpy as np
 from ...geometry import box
 from ...output import Figure
 from ...scheme.arrangement import Current
-from ...scheme.reference import Always, ReferencePolicy
+from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import difference, energy_figures

@@ -17,7 +17,7 @@ from ...boundaries import Fixed
 from ...geometry import box
 from ...materials import LinearElastic
 from ...output import Figure
-from ...scheme.reference import Never
+from ...scheme.policy import Never
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import order

@@ -1,0 +1,176 @@
+"""Bodies and options as the parts of a world: particles, a state, and the media that share a reference."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .body import Body
+from .failure import place_of
+from .fields import allocate, part
+from .scheme.arrangement import Arrangement
+from .scheme.base import Scheme
+from .scheme.flux import Flux, check_reference
+from .scheme.medium import MediumParts, is_corrected
+from .scheme.policy import Never, ReferencePolicy
+from .scheme.reference import Configuration
+from .scheme.world import World
+from .space import Space
+from .weights import Weight
+
+
+class Options(NamedTuple):
+    """What the bodies of a medium share."""
+
+    reference: ReferencePolicy
+    arrangement: Arrangement
+    scheme: Scheme
+    weight: Weight
+    dilation: float
+
+
+@dataclass(frozen=True)
+class MediumPlan:
+    """A medium to be: bodies that follow each other, with the same options.
+
+    Attributes:
+        span: numbers of its particles.
+    """
+
+    bodies: Sequence[Body]
+    options: Options
+    span: range
+
+    @property
+    def n(self) -> int:
+        """Particles."""
+        return len(self.span)
+
+    @property
+    def moving(self) -> list[bool]:
+        """Whether the arrangement of each body moves with the reference."""
+        reference, arrangement = self.options.reference, self.options.arrangement
+        return [not reference.fixed and arrangement.moves(body.material) for body in self.bodies]
+
+    @property
+    def moves(self) -> bool:
+        """Whether any of them does."""
+        return any(self.moving)
+
+    @property
+    def reach(self) -> float:
+        """Support radius in spacings."""
+        return self.options.weight.support * self.options.dilation
+
+    def build(self, space: Space, particles: Any, box: Any, device: Any) -> MediumParts:
+        """Allocate; ``particles`` are those of all media."""
+        scheme, moving, own = self.options.scheme, self.moving, part(space, particles, "Particles", self.span)
+        policy = self.options.reference if self.moves else Never()
+        given = self.bodies[0].surface is not None
+        flux = Flux(space, [(body.material, len(body.x)) for body in self.bodies], own, device)
+        configuration = Configuration(
+            space,
+            self.options.weight,
+            own,
+            box,
+            device,
+            moving=[body for body, moves in zip(flux.bodies, moving, strict=True) if moves],
+            corrected=is_corrected(scheme, policy, given),
+            tilt=scheme.tilt,
+        )
+        return MediumParts(scheme, policy, self.span, own, flux, configuration, moving, given)
+
+
+def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
+    """The media of these bodies, in their order.
+
+    Raises:
+        ValueError: options that do not suit a material, or schemes of different kinds.
+    """
+    ranges = ranges_of(bodies)
+    media: list[MediumPlan] = []
+    for body in bodies:
+        options = options_of(body, defaults)
+        check_reference([body.material], options.reference)
+        if type(options.scheme) is not type(defaults.scheme):
+            raise ValueError(
+                f"scheme of body {body.name!r} must be {type(defaults.scheme).__name__}(...), as the simulation's, for "
+                f"all take the same steps, got {options.scheme}; pass scheme={type(options.scheme).__name__}(...) to "
+                "the simulation"
+            )
+        together, span = [body], ranges[body.name]
+        if media and media[-1].options == options and media[-1].moves == MediumPlan([body], options, span).moves:
+            before = media.pop()
+            together, span = [*before.bodies, body], range(before.span.start, span.stop)
+        media.append(MediumPlan(together, options, span))
+    return media
+
+
+def options_of(body: Body, defaults: Options) -> Options:
+    """The options of a body: its own, and for those that are None the defaults."""
+    own = {name: getattr(body, name) for name in Options._fields}
+    return defaults._replace(**{name: value for name, value in own.items() if value is not None})
+
+
+def ranges_of(bodies: Sequence[Body]) -> dict[str, range]:
+    """Name of each body -> numbers of its particles."""
+    ends = np.cumsum([0, *[len(body.x) for body in bodies]]).tolist()
+    return {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(bodies)}
+
+
+def make_particles(space: Space, media: Sequence[MediumPlan], device: Any) -> Any:
+    """Struct ``Particles`` of all media."""
+    bodies = [body for medium in media for body in medium.bodies]
+    dilations = np.concatenate([np.full(medium.n, medium.options.dilation) for medium in media])
+    counts = [len(body.x) for body in bodies]
+    volume, spacing = (np.concatenate([getattr(body, name) for body in bodies]) for name in ("volume", "spacing"))
+    density = np.repeat([body.material.density for body in bodies], counts)
+    particles = allocate(space, "Particles", len(volume), device)
+    particles.mass.assign(density * volume)
+    particles.V0.assign(volume)
+    particles.h.assign(dilations * spacing)
+    particles.spacing.assign(spacing)
+    particles.share.fill_(1.0)
+    particles.body.assign(np.repeat(np.arange(len(counts)), counts))
+    return particles
+
+
+def make_state(space: Space, bodies: Sequence[Body], device: Any) -> Any:
+    """Struct ``State`` of the bodies at the start."""
+    X = np.concatenate([body.x for body in bodies])
+    U = allocate(space, "State", len(X), device)
+    U.x.assign(X)
+    U.v.assign(np.concatenate([body.velocity for body in bodies]))
+    U.F.assign(np.broadcast_to(np.eye(space.dim), (len(X), space.dim, space.dim)))
+    if bodies[0].surface is not None:
+        U.surface.assign(np.concatenate([body.surface for body in bodies]))
+    return U
+
+
+def check_neighbourhoods(world: World, bodies: Sequence[Body]) -> None:
+    """Raise ValueError where particles coincide, or have neighbours that do not span the space; at the start only."""
+    X = np.concatenate([body.x for body in bodies])
+
+    def who(number: int) -> str:
+        name = next(name for name, numbers in ranges_of(bodies).items() if number in numbers)
+        return f"particle {number} {place_of(name, X[number])}"
+
+    for medium in world.media:
+        configuration, first = medium.configuration, medium.span.start
+        nearest = configuration.nearest()
+        close = np.flatnonzero(nearest < 1e-6 * medium.particles.spacing.numpy())
+        if close.size:
+            raise ValueError(
+                f"particles of a body must not coincide, got {close.size} with a neighbour closer than 1e-6 spacings; "
+                f"the first is {who(first + int(close[0]))}; remove duplicates"
+            )
+        poor = np.flatnonzero(configuration.poor.numpy())
+        if poor.size:
+            neighbours = np.diff(configuration.near.start.numpy())[poor[0]]
+            raise ValueError(
+                f"the neighbours of a particle must span all {world.space.dim} directions, {poor.size} particles lack "
+                f"some; the first is {who(first + int(poor[0]))} with {neighbours} neighbours within "
+                f"h = {medium.particles.h.numpy()[poor[0]]:.6g} m times {configuration.weight.support}; "
+                "increase dilation, check spacing, or use at least 2 particles across each direction"
+            )

@@ -1,0 +1,263 @@
+"""A medium: bodies that share the reference and the options of the scheme, and each line of a step on them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..boundaries import Bound
+from ..execution import Launcher
+from ..fields import part, part_of
+from ..space import Space
+from .base import Scheme
+from .dissipation import UpwindForces
+from .dual_forces import DualForces
+from .flux import Flux
+from .limiter import MassDiffusion
+from .pair_potentials import PairPotentials
+from .policy import ReferencePolicy
+from .reference import Configuration
+from .sensor import SensorField
+from .shifting import Shifter
+from .stabiliser import Stabiliser
+from .updates import make_drift, make_kick, make_predict
+
+
+@dataclass(frozen=True)
+class MediumParts:
+    """What a medium is made of.
+
+    Attributes:
+        options: those of its scheme.
+        policy: when its reference is refreshed.
+        span: places of its particles among all.
+        particles: struct ``Particles`` of them.
+        flux: of its bodies.
+        configuration: its reference k.
+        moving: whether the arrangement of each of its bodies moves with the reference.
+        surface_given: the bodies came with their area vectors.
+    """
+
+    options: Scheme
+    policy: ReferencePolicy
+    span: range
+    particles: Any
+    flux: Flux
+    configuration: Configuration
+    moving: Sequence[bool]
+    surface_given: bool
+
+
+def is_corrected(options: Scheme, policy: ReferencePolicy, surface_given: bool) -> bool:
+    """Whether the scheme's correction is at work: a fixed reference needs it only where surface vectors were given."""
+    return options.correction is not None and (surface_given or not policy.fixed)
+
+
+def _held(conditions: Sequence[Bound], span: range) -> np.ndarray:
+    """Which particles of ``span``, counted from its start, have imposed velocities at the start of a run, (k,)."""
+    imposed = [condition.indices for condition in conditions if type(condition).impose is not Bound.impose]
+    numbers = np.concatenate([np.zeros(0, dtype=np.int32), *imposed])
+    return numbers[(numbers >= span.start) & (numbers < span.stop)] - span.start
+
+
+class Medium:
+    """A medium at work. States are those of the whole world, of which it sees its own particles.
+
+    Attributes:
+        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
+        particles, forces, grad_v: of its own particles, views of what the world has.
+    """
+
+    def __init__(self, space: Space, parts: MediumParts, conditions: Sequence[Bound], device: Any):
+        self.space, self.device, self.n = space, device, len(parts.span)
+        self._launch = Launcher(device)
+        self.options, self.policy, self.span = parts.options, parts.policy, parts.span
+        self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
+        options, n, moving = self.options, self.n, list(parts.moving)
+        self.moving = moving
+        bodies = [body for body, moves in zip(self.flux.bodies, moving, strict=True) if moves]
+        self.shifter: Shifter | None = None
+        if options.shifting is not None and not self.policy.fixed:
+            held = _held(conditions, self.span)
+            self.shifter = options.shifting.build(space, self.particles, self.flux, bodies, held, device)
+        smoothing = options.smoothing
+        rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
+        self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
+        plain = self.configuration.plain
+        self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
+        if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
+            if 0 < len(bodies) < len(moving) and not options.correction.by_body:
+                raise ValueError(
+                    f"correction must be Balance() or None where some bodies move and others do not, got "
+                    f"{options.correction}; arrangement=Current() moves all"
+                )
+            self.stabiliser = options.correction.build(space, self.particles, self.flux, bodies, device)
+        self.pairs: PairPotentials | None = None
+        if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
+            self.pairs = PairPotentials(options.tie, plain, space, self.flux, device)
+        sensed = options.dissipation is not None and options.dissipation.sensor is not None
+        if self.stabiliser.takes_dual(self.configuration, sensed):
+            self.flux.keep_dual()
+        self.limiter: MassDiffusion | None = None
+        if options.limiter is not None:
+            self.limiter = options.limiter.build(space, self.particles, self.configuration, device)
+        users = [option for option in (options.dissipation, options.limiter) if option is not None]
+        sensors = {option.sensor for option in users if option.sensor is not None}
+        self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
+        self.smoothed_F_k = self.configuration.fields.F
+        if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
+            self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
+
+    def join(self, U: Any, half: Any, forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
+        """See the own particles of the world's two states, of ``forces`` and of ∇v, by its ``clock``."""
+        self._whole, self._own = U, part(self.space, U, "State", self.span)
+        self._own_half = part(self.space, half, "State", self.span)
+        self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
+        self.clock, self.moves_surfaces = clock, moves_surfaces
+
+    def of(self, state: Any) -> Any:
+        """Its own particles of one of the world's states: a struct ``State`` of views."""
+        return self._own if state is self._whole else self._own_half
+
+    # the reference
+
+    def due(self, step: int, state: Any) -> bool:
+        """Whether the reference is to be refreshed before step number ``step``."""
+        return not self.policy.fixed and self.policy.due(step, self.configuration, self.of(state).F)
+
+    def start(self, state: Any) -> None:
+        """Make ``state`` the first reference."""
+        self.configuration.refresh(self.of(state))
+
+    def find_surface(self, state: Any) -> None:
+        """s_a = e_a at the start (M10)."""
+        nothing_yet = self.forces.free_v
+        self.configuration.defect(nothing_yet, self.of(state).surface)
+
+    def move(self, state: Any) -> None:
+        """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
+        self.flux.rebase(self.of(state).F, self.moving)
+        self.configuration.move(self.of(state))
+
+    def renew(self, state: Any) -> None:
+        """Neighbours and corrections of the new reference (M3), and what the options add."""
+        self.configuration.renew()
+        self.stabilise(state)
+
+    def stabilise(self, state: Any) -> None:
+        """Prepare the stabiliser for a new reference, and what else depends on it."""
+        self.stabiliser.refresh(self.configuration, self.of(state))
+        self._derive()
+
+    def rebuild(self) -> None:
+        """Derive what the evolving arrays determine, after they were overwritten."""
+        self.configuration.rebuild()
+        self._derive()
+
+    def _derive(self) -> None:
+        self.configuration.resolve()
+        if self.limiter is not None:
+            self.limiter.refresh()
+        if self.smoothed_F_k is not self.configuration.fields.F:
+            self._smooth_field(self.configuration.fields.F, self.grad_F, self.smoothed_F_k)
+
+    def shift(self, state: Any) -> None:
+        """Shift the particles (M15), where the options say so."""
+        if self.shifter is not None:
+            U = self.of(state)
+            self.velocity_gradient(state)
+            self.configuration.gradient(self._rows(U.F), self.grad_F)
+            potentials = self.stabiliser.psi  # type: ignore[attr-defined]
+            self.shifter.apply(self.configuration, potentials, U, self.grad_v, self.grad_F, self.clock)
+
+    # the lines of a step
+
+    def velocity_gradient(self, state: Any) -> None:
+        """∇_k v (M4)."""
+        self.configuration.gradient(self.of(state).v, self.grad_v)
+
+    def gradients(self, state: Any) -> None:
+        """∇_k v, and ∇_k F where the smoothing needs it (M4)."""
+        self.velocity_gradient(state)
+        if self.options.smoothing is not None and self.options.smoothing.needs_gradient:
+            self.configuration.gradient(self._rows(self.of(state).F), self.grad_F)
+
+    def wave_speeds(self, state: Any) -> None:
+        """Wave speeds, and their largest rate into the clock's."""
+        self.flux.wave_speeds(self.of(state).F, self.grad_v, self.configuration, self.clock)
+
+    def sense(self, state: Any) -> None:
+        """d of v, and the diffusion of the state (§5)."""
+        U = self.of(state)
+        for sensor in self.sensors.values():
+            sensor.compute(self.configuration, self.flux.fields, U.v, self.grad_v)
+        if self.limiter is not None:
+            self.limiter.prepare(U, self.sensors[self.limiter.option.sensor].d)
+
+    def stress(self, state: Any, fraction: float) -> None:
+        """Q of F (M1), which is ``fraction`` · Δt ahead of the histories."""
+        self.flux.compute(self.of(state).F, self.grad_v, self.configuration, self.clock, fraction)
+
+    def sum_forces(self, state: Any, rates: Any) -> None:
+        """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
+        at, v, options = self.of(state), self.of(rates).v, self.options
+        epsilon, d = 0.0, None
+        if options.dissipation is not None:
+            epsilon = options.dissipation.epsilon
+            if options.dissipation.sensor is not None:
+                d = self.sensors[options.dissipation.sensor].d
+        if self.pairs is not None:
+            self.pairs.compute(self.configuration, at, v, self.grad_v, epsilon, d, self.forces)
+        arguments = (self.configuration, self.flux.fields, at.x, v, self.grad_v, epsilon, d, self.forces)
+        self.stabiliser.compute(*arguments)
+
+    def smooth(self, state: Any, out: Any) -> None:
+        """S of v and F (M6, M7)."""
+        U, half = self.of(state), self.of(out)
+        self._smooth_field(U.v, self.grad_v, half.v)
+        self._smooth_field(U.F, self.grad_F, half.F)
+
+    def predict(self, state: Any, out: Any, fraction: float) -> None:
+        """``out``, which is S of ``state``, moved by ``fraction`` · Δt (M8)."""
+        arguments = [self.particles, self.of(state), self.smoothed_F_k, self.grad_v, self.forces, self.clock]
+        kernel = make_predict(self.space, self.configuration.fixed, self.moves_surfaces)
+        self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
+
+    def kick(self, state: Any) -> None:
+        """v^{n+1} (M8)."""
+        arguments = [self.particles, self.forces, self.clock, self.of(state).v]
+        self._launch(make_kick(self.space), self.n, arguments)
+
+    def drift(self, state: Any, rates: Any, fraction: float, out: Any) -> None:
+        """F and x of ``state`` moved by ``fraction`` · Δt with v of ``rates``, into ``out`` (M8)."""
+        arguments = [self.configuration.fields, self.of(state), self.of(rates).v, self.grad_v, self.clock]
+        kernel = make_drift(self.space, self.configuration.fixed, self.moves_surfaces)
+        self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
+
+    def limit(self, state: Any) -> None:
+        """U^{n+1} += d × diffusion (§5)."""
+        if self.limiter is not None:
+            self.limiter.apply(self.of(state), self.clock)
+
+    def update(self, state: Any) -> None:
+        """Histories after a full step, and what materials keep of F: liquids J only."""
+        self.flux.update(self.of(state).F, self.grad_v, self.configuration, self.clock)
+
+    def evolving(self) -> dict[str, wp.array]:
+        """Every array of its own that a step reads before it writes it, by name."""
+        parts = [self.configuration.evolving(), self.flux.evolving(), self.stabiliser.evolving()]
+        if self.shifter is not None:
+            parts.append(self.shifter.evolving())
+        return {name: array for held in parts for name, array in held.items()}
+
+    def _smooth_field(self, f: wp.array, gradient: wp.array, out: wp.array) -> None:
+        if self.options.smoothing is None:
+            wp.copy(out, f)
+        else:
+            self.options.smoothing.apply(self.space, self.configuration, self._rows(f), gradient, self._rows(out))
+
+    def _rows(self, f: wp.array) -> wp.array:
+        """The same memory with each element as one row of reals."""
+        return f.view(self.space.row(wp.types.type_size(f.dtype)))
