@@ -302,12 +302,19 @@ def block(dim, reference, dtype=wp.float64, hardening=HARDENINGS["linear"], **op
     x, volume = box((0.0,) * dim, (0.01,) * dim, 0.01 / n)
     velocity = -2e4 * (x - 0.005) * np.array([1.0, -0.5, 0.3])[:dim]
     body = es.Body(x=x, volume=volume, material=J2(**COPPER, hardening=hardening), velocity=velocity)
-    return es.Simulation(body, reference=reference, dtype=dtype, **options)
+    return es.Simulation(body, reference=reference, arrangement=es.Current(), dtype=dtype, **options)
 
 
-@pytest.mark.parametrize("dtype", [wp.float32, wp.float64])
-@pytest.mark.parametrize("dim", [1, 2, 3])
-@pytest.mark.parametrize("reference", [es.Never(), es.Every(4), es.Always()], ids=repr)
+@pytest.mark.parametrize(
+    ("reference", "dim", "dtype"),
+    [
+        (es.Never(), 3, wp.float64),
+        (es.Always(), 3, wp.float32),
+        (es.Every(4), 2, wp.float64),
+        (es.Always(), 2, wp.float32),
+        (es.Always(), 1, wp.float64),
+    ],
+)
 def test_the_books_close(reference, dim, dtype):
     """Every joule is kinetic, stored, plastic or M9's; plastic work is the material's account, stepping stays small."""
     simulation = block(dim, reference, dtype, HARDENINGS["johnson_cook"])
@@ -321,7 +328,7 @@ def test_the_books_close(reference, dim, dtype):
     assert simulation.history("temperature").min() > 293.0
 
 
-@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("dim", [2, 3])
 def test_every_reference_gives_the_same_answer(dim):
     """The arrangement read anew each step, each tenth, and never, without tie and tilt."""
     scheme = es.Verlet(tie=None, tilt=None)
@@ -330,7 +337,7 @@ def test_every_reference_gives_the_same_answer(dim):
         simulation.run(4e-6)
     strains = [simulation.history("plastic_strain") for simulation in found]
     np.testing.assert_allclose(strains[2], strains[1], atol=1e-3)
-    np.testing.assert_allclose(strains[0].mean(), strains[1].mean(), rtol=0.01)
+    np.testing.assert_allclose(strains[0].mean(), strains[1].mean(), rtol=0.02)
     assert strains[0].mean() > 0.01
 
 
@@ -356,6 +363,38 @@ def test_sigma_33_of_plane_strain_knows_the_history():
     y = 0.4e9 + 0.1e9 * simulation.history("plastic_strain")
     assert (q <= y * (1.0 + 1e-9)).all() and (q > 0.99 * y).any()
     np.testing.assert_allclose(np.trace(sigma.T) / 3.0, KAPPA * np.log(J) / J, atol=1e-9 * KAPPA)
+
+
+@wp.func
+def slide(X: wp.vec2d, t: wp.float64) -> wp.vec2d:
+    return wp.vec2d(wp.float64(10.0) * t * X[1], wp.float64(0.0))
+
+
+def plates(n, surface=None, **options):
+    """A jittered block, n across, that yields at 1 % of its modulus, sheared by 10 per second; the free particles."""
+    x, volume = box((0.0, 0.0), (1.0, 1.0), 1.0 / n, jitter=0.1)
+    layers = np.arange(len(x)) % n  # the last axis of a lattice runs fastest
+    law = J2(density=1e3, young=1e6, poisson=0.3, hardening=LinearHardening(yield_stress=1e4))
+    velocity = 10.0 * x[:, 1:] * np.array([1.0, 0.0])
+    body = es.Body(x=x, volume=volume, material=law, velocity=velocity, surface=surface)
+    held = [es.Motion(slide, layers >= n - 3), es.Motion(slide, layers < 3)]
+    free = (layers >= 3) & (layers < n - 3)
+    return es.Simulation(body, boundaries=held, periodic=(1.0, 0.0), **options), free
+
+
+def test_shear_without_end_keeps_the_yield_stress():
+    """To a shear of 20 Eulerian, kept even and with true surface vectors; the fixed reference to 3, by short steps."""
+    layers = np.arange(144) % 12
+    surface = ((1.0 * (layers == 11) - 1.0 * (layers == 0)) / 12)[:, None] * np.array([0.0, 1.0])
+    even = {"arrangement": es.Current(), "scheme": es.Verlet(shifting=es.Shifting()), "surface": surface}
+    for shear, options in ((20.0, even), (3.0, {})):
+        simulation, free = plates(12, **options)
+        simulation.run(shear / 10.0)
+        tau = simulation.cauchy_stress[free, 0, 1] / (1e4 / math.sqrt(3.0))
+        assert np.abs(tau - 1.0).max() < 0.03
+        assert float(simulation.history("plastic_strain")[free].mean()) > 0.95 * shear / math.sqrt(3.0)
+        energy = simulation.energy()
+        assert abs(energy["residual"]) < 1e-12 * energy["total"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

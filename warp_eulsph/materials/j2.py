@@ -3,7 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import warp as wp
 
@@ -42,7 +42,6 @@ class J2(Isotropic):
     """
 
     hardening: Hardening
-    flows: ClassVar[bool] = True
 
     def constants(self) -> dict[str, Any]:
         mu, kappa = lame_constants(self.young, self.poisson)
