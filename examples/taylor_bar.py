@@ -15,7 +15,7 @@ import numpy as np
 import warp_eulsph as es
 from warp_eulsph.geometry import cylinder
 from warp_eulsph.materials import J2, LinearHardening
-from warp_eulsph.output import Figure, table
+from warp_eulsph.validation import Figure, table
 from warp_eulsph.validation.cases.taylor_bar import END, FORMS, measure
 
 COPPER = J2(density=8930.0, young=117e9, poisson=0.35, hardening=LinearHardening(yield_stress=0.4e9, modulus=0.1e9))

@@ -15,7 +15,7 @@ EQUATIONS = set(re.findall(r"\((M\d+)\)", METHOD))
 
 
 # Files that runs and users make.
-OF_USERS = {"ciarlet.py", "foam.py", "case.toml", "DIR/case.toml", "mine.toml"}
+OF_USERS = {"ciarlet.py", "foam.py", "plate.toml", "rigid_floor.py", "case.toml", "DIR/case.toml", "mine.toml"}
 
 
 def ids(path):

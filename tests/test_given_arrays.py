@@ -1,6 +1,9 @@
 """Arrays that users give go where they say, in every order and shape, or are refused; those they get are read-only."""
 
+import inspect
 import logging
+import math
+import re
 
 import numpy as np
 import pytest
@@ -11,10 +14,14 @@ from hypothesis import strategies as st
 from kept_runs import plate
 
 import warp_eulsph as es
+from warp_eulsph import overlap
 from warp_eulsph.boundaries import Assembly
 from warp_eulsph.geometry import box
 from warp_eulsph.operators.neighbours import MOST_PAIRS
 from warp_eulsph.order import Order
+from warp_eulsph.output import Recording
+from warp_eulsph.overlap import MOST, SHARE, Encounters
+from warp_eulsph.schedule import AnyOf, AtTimes
 
 X = plate().X
 N = len(X)
@@ -196,6 +203,24 @@ def test_wrong_kinds_say_what_to_write():
         (lambda: es.Body(x=np.arange(4.0), volume=1.0, material=RUBBER), r"in 1-D give x\[:, None\]"),
         (lambda: es.Every(1.5), "must be a whole number, at least 1, got 1.5"),
         (lambda: es.Every(True), "must be a whole number, at least 1, got True"),
+        (lambda: es.TimeStep(cfl="0.5"), "TimeStep: cfl must be a number or None, got '0.5'"),
+        (lambda: es.TimeStep(growth=None), "TimeStep: growth must be a number, got None"),
+        (lambda: es.Verlet(dissipation=es.Upwind), r"must be such as Upwind\(\.\.\.\) or None, .*; write Upwind\("),
+        (lambda: es.Verlet(tie=True), r"Verlet: tie must be such as Tie\(\.\.\.\) or None, got True"),
+        (lambda: es.Verlet(correction="Balance"), r"correction must be such as Balance\(\.\.\.\) or None, got 'Bal"),
+        (lambda: es.LaxWendroff(smoothing=3), "LaxWendroff: smoothing must be such as"),
+        (lambda: es.NeoHookean(density=None, young=1.0, poisson=0.3), "density must be a number, got None"),
+        (lambda: es.Simulation(body, sort="no"), "sort must be True or False, got 'no'"),
+        (lambda: es.Simulation(body).step(1.5), "count of steps must be a whole number, at least 0, got 1.5"),
+        (lambda: es.Simulation(body).run(until=1e-9, output=3), "directory must be such as 'runs/column', got int 3"),
+        (lambda: es.Simulation(body, boundaries=[es.Fixed(lambda x, y: x < y)]), "function of 1 argument such as"),
+        (lambda: stepped(es.Velocity(None, value=lambda t: t)), "value must be a function of 2 arguments such as"),
+        (lambda: AtTimes(0.1), "times must be finite and increase"),
+        (lambda: AtTimes("12"), "times must be real numbers"),
+        (lambda: AnyOf([3]), r"schedules\[0\] must be such as EveryTime"),
+        (lambda: Recording(fields="velocity"), r"fields must be a list of names, got 'velocity'; write \['velocity'\]"),
+        (lambda: Recording(snapshots=0.1), "snapshots must be such as EveryTime"),
+        (lambda: box((0.0, 0.0), (1.0, 1.0), "0.1"), "spacing must be a number, got '0.1'"),
     ]:
         with pytest.raises(ValueError, match=message):
             make()
@@ -203,9 +228,32 @@ def test_wrong_kinds_say_what_to_write():
     assert len(one.boundaries) == len(listed.boundaries) == 1
 
 
-def block(corner, name, spacing=0.1, dim=2):
-    x, volume = box([0.0] * dim, [1.0] * dim, spacing)
-    return es.Body(x=x + np.array(corner), volume=volume, material=RUBBER, name=name)
+def test_unknown_keywords_say_who_takes_them():
+    body = plate().bodies[0]
+    for make, message in [
+        (
+            lambda: es.Verlet(cfl=3),
+            r"^Verlet takes no 'cfl'; TimeStep\(cfl=\.\.\.\) does\. Verlet takes dissipation, corr",
+        ),
+        (lambda: es.LaxWendroff(cfl=0.3), r"TimeStep\(cfl=\.\.\.\) does"),
+        (lambda: es.Simulation(body, cfl=0.3), r"TimeStep\(cfl=\.\.\.\) does"),
+        (lambda: es.Simulation(body, material=RUBBER), r"; Body\(material=\.\.\.\) "),
+        (lambda: es.Fixed(axis=[0]), r"Fixed takes no 'axis'; did you mean axes\?"),
+        (lambda: es.Never(steps=3), r"Every\(steps=\.\.\.\) does\. Never has no options"),
+        (lambda: Recording(until=1.0), "Recording takes no 'until'. Recording takes snapshots, fields"),
+    ]:
+        with pytest.raises(TypeError, match=message):
+            make()
+    assert list(inspect.signature(es.TimeStep).parameters) == ["cfl", "growth", "fixed"]
+
+
+def block_of(corner, spacing=0.1):
+    x, volume = box([0.0] * 2, [1.0] * 2, spacing)
+    return {"x": x + np.array(corner), "volume": volume, "material": RUBBER}
+
+
+def block(corner, name, spacing=0.1):
+    return es.Body(**block_of(corner, spacing), name=name)
 
 
 @pytest.mark.parametrize(
@@ -235,7 +283,7 @@ def test_bodies_that_overlap_or_touch_are_named(corner, other, periodic, counts,
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 3), st.integers(0, 10**6))
 def test_overlaps_are_those_of_a_search_through_all_pairs(dim, seed):
-    from warp_eulsph.overlap import TOUCHING, overlaps
+    from warp_eulsph.overlap import TOUCHING
 
     rng = np.random.default_rng(seed)
     x, y = (rng.random((count, dim)) * rng.uniform(0.2, 2.0) for count in (40, 60))
@@ -246,12 +294,69 @@ def test_overlaps_are_those_of_a_search_through_all_pairs(dim, seed):
     ]
     far = np.linalg.norm(x[:, None] - y[None], axis=2)
     close = far < TOUCHING * 0.5 * (spacing[:, None] + other[None])
-    found = overlaps(bodies, [np.zeros(40, dtype=bool), np.zeros(60, dtype=bool)], (0.0,) * dim)
+    encounters = Encounters(bodies, np.zeros(100, dtype=bool), (0.0,) * dim)
+    found = encounters.look(np.concatenate([x, y]), 0.0, 0)
+    assert not encounters.look(np.concatenate([x, y]), 0.0, 0) or not found  # once
     if close.any():
         counts = close.any(axis=1).sum(), close.any(axis=0).sum()
         assert f"{counts[0]} particles of 'a' and {counts[1]} particles of 'b'" in found[0]
     else:
         assert not found
+
+
+@pytest.mark.parametrize("graphs", [False, True])
+def test_bodies_that_pass_through_each_other_later_are_named_once(graphs, caplog):
+    left = es.Body(**block_of((0.0, 0.0)), velocity=(100.0, 0.0), name="left")
+    right, far = es.Body(**block_of((1.5, 0.0)), name="right"), es.Body(**block_of((0.0, 9.0)), name="far")
+    with caplog.at_level(logging.WARNING):
+        simulation = es.Simulation([left, right, far])
+        simulation.by_graphs = graphs
+        assert not caplog.records
+        simulation.run(until=4e-3)  # the gap of half a metre, less a quarter of a spacing, is closed by 4.75 ms
+        assert not caplog.records
+        simulation.run(until=0.04)
+    (line,) = (record.getMessage() for record in caplog.records)
+    found = re.match(r"bodies 'left' and 'right' overlap or touch by t = (\S+) s, step \d+: (\d+) particles of", line)
+    assert found and 4.5e-3 < float(found[1]) < 0.02 and int(found[2]) >= 10
+
+
+def test_looks_for_encounters_are_few_while_bodies_are_apart(monkeypatch):
+    looks = []
+    look = Encounters.look
+    monkeypatch.setattr(
+        Encounters, "look", lambda self, x, t, step, *more: looks.append(t) or look(self, x, t, step, *more)
+    )
+    slow = {"velocity": (1.0, 0.0), "name": "slow"}
+    simulation = es.Simulation(
+        [es.Body(**block_of((0.0, 0.0)), **slow), block((3.0, 0.0), "far")], reference=es.Never()
+    )
+    simulation.run(until=0.1)
+    assert simulation.steps > 300 and len(looks) - 1 <= simulation.steps // MOST
+
+
+def test_comparing_places_takes_a_small_share_of_the_time(monkeypatch):
+    """A ball in a cup, whose boxes meet all the time: a clock that stands still but for the comparisons."""
+    x, volume = box((0.0, 0.0), (1.0, 1.0), 0.05)
+    inside = np.abs(x - 0.5).max(axis=1)
+    made = {"volume": volume, "material": RUBBER}
+    bodies = [es.Body(x=x[part], name=name, **made) for part, name in ((inside < 0.2, "ball"), (inside > 0.4, "cup"))]
+    now, compared, near = [0.0], [], overlap._near
+
+    def comparing(*given):
+        now[0] += 2.0  # s, half of what a comparison takes
+        compared.append(now[0])
+        return near(*given)
+
+    monkeypatch.setattr(overlap.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(overlap, "_near", comparing)
+    encounters, X = (
+        Encounters(bodies, np.zeros(sum(len(b.x) for b in bodies), bool), (0.0, 0.0)),
+        np.concatenate([body.x for body in bodies]),
+    )
+    for step in range(1000):
+        now[0] += 1.0
+        assert not encounters.look(X, 0.0, step)
+    assert len(compared) == 2 * math.ceil(1000 / (4.0 / SHARE))
 
 
 def test_mirror_ghosts_are_no_overlap(caplog):

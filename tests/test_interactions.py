@@ -1,5 +1,6 @@
 """Forces between bodies, or with something rigid: momentum pair by pair, an account, a step of their own."""
 
+import dataclasses
 import functools
 from dataclasses import dataclass
 
@@ -13,6 +14,9 @@ from warp_eulsph import execution
 from warp_eulsph.fields import clock_structure, structure
 from warp_eulsph.geometry import disc
 from warp_eulsph.interactions import BoundInteraction
+from warp_eulsph.output import Recording, Run, record
+from warp_eulsph.output.record import ChangedCaseError
+from warp_eulsph.schedule import AtTimes
 
 
 @functools.cache
@@ -361,6 +365,24 @@ def test_a_drop_inside_a_total_lagrangian_ring(dtype):
 def test_a_drop_inside_a_ring_resumes_bit_for_bit():
     execution.set_graphs(True)
     test_resumed_runs_go_on_bit_for_bit(drop_in_ring)
+
+
+def test_recorded_runs_go_on_and_know_their_interactions(tmp_path):
+    def run(directory, until, stiffness=4e5):
+        simulation = drop_in_ring()
+        option = dataclasses.replace(simulation.interactions[0], stiffness=stiffness)
+        simulation = es.Simulation(simulation.bodies, interactions=[option])
+        record(simulation, directory, until, Recording(snapshots=AtTimes([0.09, 0.1, 0.11])), resume=True)
+        return simulation
+
+    whole = run(tmp_path / "whole", 0.11)
+    run(tmp_path / "parts", 0.1)
+    assert bits(run(tmp_path / "parts", 0.11)) == bits(whole)
+    log, of_whole = (Run(tmp_path / name).log for name in ("parts", "whole"))
+    assert log["held"][-1] == of_whole["held"][-1]
+    assert log["held"].max() > 0.0 > log["interaction"].min()
+    with pytest.raises(ChangedCaseError, match=r"interactions.0.stiffness: 400000.0, now 500000.0"):
+        run(tmp_path / "parts", 0.12, stiffness=5e5)
 
 
 def test_what_is_no_interaction_is_named():

@@ -14,6 +14,7 @@ from .boundaries import (
     BodyForce,
     Boundary,
     Clamped,
+    Damping,
     Fixed,
     Gravity,
     MirrorGhosts,
@@ -27,6 +28,7 @@ from .boundaries import (
     mirror,
 )
 from .interactions import Interaction
+from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
     LinearElastic,
@@ -40,6 +42,7 @@ from .materials import (
 )
 from .notices import sum_up_compiling
 from .operators.values import Linear, Shepard
+from .options import explain_mistakes
 from .order import spatial_order
 from .scheme.arrangement import Arrangement, Convected, Current
 from .scheme.balance import Balance
@@ -60,6 +63,7 @@ from .scheme.tie import Tie
 from .scheme.tilt import Tilt
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
+from .settling import settle
 from .simulation import Body, Simulation
 from .space import Space
 from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, WendlandC2, WendlandC4, WendlandC6
@@ -80,6 +84,7 @@ __all__ = [
     "Correction",
     "CubicSpline",
     "Current",
+    "Damping",
     "DimensionlessSensor",
     "Every",
     "Fixed",
@@ -133,7 +138,10 @@ __all__ = [
     "WendlandC6",
     "WhenDistorted",
     "mirror",
+    "settle",
     "spatial_order",
 ]
 
+explain_mistakes(__all__, globals())
+rebuild_damaged()
 sum_up_compiling()

@@ -9,7 +9,7 @@ import warp as wp
 
 from .body import Body
 from .checks import instance, positive, short
-from .overlap import overlaps
+from .overlap import Encounters
 from .scheme.arrangement import Arrangement
 from .scheme.base import Scheme
 from .scheme.policy import ReferencePolicy
@@ -51,20 +51,17 @@ def checked_dtype(given: Any) -> Any:
     raise ValueError(f"dtype must be wp.float32 or wp.float64, got {short(given)}{hint}")
 
 
-def warn(bodies: Sequence[Body], ghosts: np.ndarray, box: Sequence[float], real: Any) -> None:
+def warn(bodies: Sequence[Body], encounters: Encounters, real: Any) -> None:
     """Log a warning for bodies that overlap or touch, and for positions that are too far for their precision.
 
     Args:
         bodies: of the simulation.
-        ghosts: which of all particles are mirror ghosts, (n,) bool.
-        box: lengths of the periodic box [m], 0 where it is open.
+        encounters: of the bodies.
         real: ``wp.float32`` or ``wp.float64``.
     """
-    ends = np.cumsum([len(body.x) for body in bodies])
-    lines = overlaps(bodies, np.split(ghosts, ends[:-1]), box)
     X, spacing = (np.concatenate([getattr(body, name) for body in bodies]) for name in ("x", "spacing"))
     coarse = check_precision(X, spacing, real)
-    for line in (*lines, *([coarse] if coarse else [])):
+    for line in (*encounters.look(X, 0.0, 0), *([coarse] if coarse else [])):
         log.warning("%s", line)
 
 

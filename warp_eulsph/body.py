@@ -1,5 +1,6 @@
 """A solid as particles: what a simulation is built from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,6 +39,9 @@ class Body:
         name: for boundary conditions and output.
         reference, arrangement, scheme, weight, dilation: as in ``Simulation``, whose these are where they are None.
             Bodies that follow each other and agree in all of them are one medium.
+        bonded: name of a body before it that it is bonded to: particles of both that are near each other are
+            neighbours, as in one solid of two materials. Both are of one medium. The outermost particles of each are
+            still its own, so that loads on faces go to regions away from the joint.
 
     Raises:
         ValueError: wrong shapes, entries that are not finite real numbers, volumes or spacings that are not positive.
@@ -57,6 +61,7 @@ class Body:
     scheme: Scheme | None = None
     weight: Weight | None = None
     dilation: float | None = None
+    bonded: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -128,7 +133,7 @@ def checked_bodies(bodies: list[Body]) -> list[Body]:
     """The bodies, if one simulation can run them.
 
     Raises:
-        ValueError: none, equal names, different dimensions, surfaces given for some only.
+        ValueError: none, equal names, different dimensions, surfaces given for some only, bonds to what is not there.
     """
     if not bodies:
         raise ValueError("a simulation needs at least one body, got none")
@@ -138,7 +143,23 @@ def checked_bodies(bodies: list[Body]) -> list[Body]:
     given = [body.name for body in bodies if body.surface is not None]
     if given and len(given) < len(bodies):
         raise ValueError(f"surface must be given for all bodies or for none, got it for {given} of {names}")
+    for k, body in enumerate(bodies):
+        if body.bonded is None:
+            continue
+        who, before = f"body {body.name!r}", names[:k]
+        if body.bonded not in before:
+            raise ValueError(f"{who}: bonded must be a body before it, of {before}, got {body.bonded!r}")
+        if body.material.flows or bodies[names.index(body.bonded)].material.flows:
+            raise ValueError(f"{who}: bonded bodies must not flow; join liquids by an interaction")
     dims = {body.name: body.x.shape[1] for body in bodies}
     if len(set(dims.values())) > 1:
         raise ValueError(f"bodies must have the same dimension, got {dims}")
     return bodies
+
+
+def groups_of(bodies: Sequence[Body]) -> list[int]:
+    """Number of the bodies that each is bonded to, with what those are bonded to: equal for all that are connected."""
+    groups: dict[str, int] = {}
+    for k, body in enumerate(bodies):
+        groups[body.name] = k if body.bonded is None else groups[body.bonded]
+    return list(groups.values())

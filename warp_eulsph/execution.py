@@ -27,7 +27,8 @@ RANGES_PER_THREAD = 4
 MOST_RECORDED = 256
 
 
-def _cores() -> int:
+def cores() -> int:
+    """Cores that the process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -41,7 +42,7 @@ def _from_environment() -> tuple[int, bool, bool | None]:
     recorded = os.environ.get("WARP_EULSPH_GRAPHS", "auto")
     if recorded not in ("auto", "0", "1"):
         raise ValueError(f"WARP_EULSPH_GRAPHS must be auto, 0 or 1, got {recorded!r}")
-    return int(given) if given else _cores(), vectors == "1", {"auto": None, "0": False, "1": True}[recorded]
+    return int(given) if given else cores(), vectors == "1", {"auto": None, "0": False, "1": True}[recorded]
 
 
 _wrong: str | None = None
@@ -65,7 +66,7 @@ def set_threads(count: int | None = None) -> None:
     with turn:
         if _pool is not None:
             _pool.shutdown()
-        _threads, _pool = _cores() if count is None else count, None
+        _threads, _pool = cores() if count is None else count, None
 
 
 def set_simd(on: bool) -> None:

@@ -28,7 +28,8 @@ PARTICLES = {
     "h": Field("real", "m", "initial smoothing length, dilation times spacing"),
     "spacing": Field("real", "m", "initial particle spacing"),
     "share": Field("real", "-", "1; 0 for ghosts, which energies and momenta leave out"),
-    "body": Field("int", "-", "number of the body; only particles of one body are neighbours"),
+    "body": Field("int", "-", "number of the body"),
+    "group": Field("int", "-", "number of what is bonded together; only particles of one are neighbours"),
 }
 STATE = {
     "x": Field("vec", "m", "position"),
@@ -71,7 +72,8 @@ FORCES = {
     "correction": Field("vec", "N", "force of the closed pair areas (M10, M11, M12)"),
     "dissipation": Field("vec", "N", "upwind dissipation (M9)"),
     "tie": Field("vec", "N", "force that ties positions to F (M16)"),
-    "external": Field("vec", "N", "body forces, tractions, pressures"),
+    "external": Field("vec", "N", "body forces, tractions, pressures, damping"),
+    "damping": Field("vec", "N", "share of the external forces that damps motion, zero where nothing does"),
     "free_v": Field("vec", "m/s", "velocity at the end of the step before the conditions were imposed"),
     "reaction": Field("vec", "N", "force that the imposed velocities took, mean over the step"),
 }

@@ -28,6 +28,27 @@ class Looks:
     stepper: Any
     particles: Any
 
+    if TYPE_CHECKING:
+
+        @property
+        def t(self) -> float: ...
+
+        @property
+        def dt(self) -> float: ...
+
+        @property
+        def steps(self) -> int: ...
+
+        @property
+        def x(self) -> np.ndarray: ...
+
+        @property
+        def F(self) -> np.ndarray: ...
+
+        def extrema(self) -> dict[str, float]: ...
+
+        def energy(self) -> dict[str, float]: ...
+
     @property
     def X(self) -> np.ndarray:
         """Initial positions [m], (n, dim)."""
@@ -52,10 +73,9 @@ class Looks:
 
         F is the one the material carries: of a liquid its volume only.
         """
-        from .output.tensors import padded
+        from .output.tensors import first_piola
 
-        F = padded(self.F, 1.0)
-        return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)
+        return first_piola(self.cauchy_stress, self.F)
 
     @property
     def strain_energy_density(self) -> np.ndarray:

@@ -35,7 +35,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
         field for group, fields in GROUPS.items() for name, field in fields.items() if f"{group}.{name}" not in absent
     ]
     reals = sum(sizes[field.kind] for field in present) + 2 * d + d * d + d * d + d  # the half step, ∇v, old v
-    ints, doubles = 4, 2 + 2 * 7 / 64  # body, number, start, poor; energies, blocks of the books
+    ints, doubles = 5, 2 + 2 * 7 / 64  # body, group, number, start, poor; energies, blocks of the books
     if vectors:
         reals += LANES * (3 + 2 * d)
     if not moving:

@@ -2,9 +2,11 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
+
+from .checks import objects, real_array
 
 # Times closer than this share of an interval, or of themselves, are one: a step between them would be round-off.
 SAME = 1e-9
@@ -103,9 +105,10 @@ class AtTimes(Schedule):
     times: Sequence[float] = ()
 
     def __post_init__(self) -> None:
-        times = tuple(float(time) for time in self.times)
-        if not all(math.isfinite(time) for time in times) or list(times) != sorted(set(times)):
-            raise ValueError(f"times must be finite and increase [s], got {list(self.times)}")
+        given = real_array(list(self.times) if isinstance(self.times, Iterable) else self.times, "times")
+        times = tuple(given.tolist()) if given.ndim == 1 else ()
+        if given.ndim != 1 or list(times) != sorted(set(times)):
+            raise ValueError(f"times must be finite and increase [s], got {given.tolist()}")
         object.__setattr__(self, "times", times)
 
     def due(self, t: float, step: int) -> bool:
@@ -120,6 +123,9 @@ class AnyOf(Schedule):
     """When any of several schedules says so."""
 
     schedules: Sequence[Schedule]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "schedules", tuple(objects(self.schedules, Schedule, "schedules", "EveryTime(1e-3)")))
 
     def due(self, t: float, step: int) -> bool:
         return any(schedule.due(t, step) for schedule in self.schedules)

@@ -10,7 +10,7 @@ from .arguments import check_options, warn
 from .body import Body, checked_bodies
 from .boundaries import Assembly, Boundary
 from .building import Options, check_neighbourhoods, make_particles, make_state, plan_media, ranges_of
-from .checks import check_restorable, checked_box, objects, real_number
+from .checks import check_restorable, checked_box, objects, real_number, whole_number
 from .diagnostics import Diagnostics
 from .execution import graphs
 from .failure import failure
@@ -18,6 +18,7 @@ from .interactions import Interaction
 from .looks import Looks
 from .memory import check_memory
 from .order import Order
+from .overlap import Encounters
 from .progress import Bar
 from .schedule import AtTimes, EveryTime, targets
 from .scheme.arrangement import Arrangement, Convected
@@ -102,7 +103,8 @@ class Simulation(Looks):
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order, surface_given)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
         self.bound_interactions = [interaction.bind(assembly) for interaction in self.interactions]
-        warn(self.bodies, self.particles.share.numpy() == 0.0, box, self.space.real)
+        self.encounters = Encounters(self.bodies, self.particles.share.numpy() == 0.0, box)
+        warn(self.bodies, self.encounters, self.space.real)
         self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
         self.stepper = scheme.build(
             Parts(
@@ -169,8 +171,8 @@ class Simulation(Looks):
 
     def step(self, count: int = 1) -> None:
         """Take ``count`` steps of the scheme's own length, aiming at no time."""
+        end = self.steps + whole_number(count, 0, "count of steps")
         self.clock.aim(np.inf)
-        end = self.steps + count
         while self.steps < end:
             self._take_steps(end - self.steps)
 
@@ -204,6 +206,7 @@ class Simulation(Looks):
                 self.sorting.look_after(self.steps)
         if unstable is not None:
             raise unstable
+        self.encounters.look_now_and_then(self)
 
     # what a checkpoint holds
 

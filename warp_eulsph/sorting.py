@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .boundaries import Bound
 from .fields import structure
+from .interactions import BoundInteraction
 from .order import Order, spatial_order
 from .reduce import SumOfParticles
 from .scheme.medium import Medium
@@ -99,7 +101,8 @@ class Sorting:
     def __init__(self, stepper: Stepper, order: Order, on: bool):
         self.stepper, self.order = stepper, order
         self.space, self.device = stepper.space, stepper.device
-        self.on = on and all(part.sortable for part in (*stepper.conditions, *stepper.interactions))
+        self._parts: list[Bound | BoundInteraction] = [*stepper.conditions, *stepper.interactions]
+        self.on = on and all(part.sortable for part in self._parts)
         if on and not self.on:
             log.info("particles are not sorted in memory: a condition or interaction does not say that it is sortable")
         self._counts = [_CountParted(medium) for medium in stepper.media]
@@ -166,8 +169,7 @@ class Sorting:
     def _arrays(self) -> Iterator[tuple[wp.array, range]]:
         """What evolves and has an element for each particle, and the particles that each array is of."""
         stepper = self.stepper
-        parts = (*stepper.conditions, *stepper.interactions)
-        own = {id(array) for part in parts for array in part.evolving().values()}
+        own = {id(array) for part in self._parts for array in part.evolving().values()}
         spans: dict[int, range] = {}
         for medium in stepper.media:
             spans |= {id(array): medium.span for array in medium.evolving().values()}

@@ -1,5 +1,6 @@
 """What a boundary condition declares, and how regions select particles."""
 
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -51,6 +52,7 @@ class Assembly:
         if region is None:
             chosen = np.arange(n)
         elif callable(region):
+            check_takes(region, 1, f"{who}: region", "lambda X: X[:, 0] < 0.1")
             chosen = np.flatnonzero(_mask(region(read_only(self.X)), self.X, who))
         else:
             chosen = _indices(region, n, who)
@@ -71,6 +73,20 @@ def rows_of(indices: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     order = np.argsort(indices)
     rows: np.ndarray = order[np.searchsorted(indices, numbers, sorter=order)]
     return rows
+
+
+def check_takes(function: Any, count: int, who: str, example: str) -> None:
+    """ValueError unless a user's ``function`` takes so many arguments; where Python cannot tell it passes."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(*range(count))
+    except TypeError:
+        raise ValueError(
+            f"{who} must be a function of {count} argument{'s'[: count > 1]} such as {example}, got one of {signature}"
+        ) from None
 
 
 def read_only(values: np.ndarray) -> np.ndarray:
@@ -142,6 +158,11 @@ class Bound:
         return type(self).load is not Bound.load
 
     @property
+    def damps(self) -> bool:
+        """Whether ``damp`` adds forces."""
+        return type(self).damp is not Bound.damp
+
+    @property
     def reads_surface(self) -> bool:
         """Whether ``load`` reads ``state.surface``; where the reference is fixed they move for those that do."""
         return self.loads
@@ -159,6 +180,9 @@ class Bound:
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         """Add forces [N] at time t + fraction · Δt to ``external``."""
+
+    def damp(self, state: Any, clock: Any, forces: Any) -> None:
+        """Add forces [N] that damp motion to both ``forces.external`` and ``forces.damping``; comes after ``load``."""
 
     def limit(self, state: Any, clock: Any) -> None:
         """Ask for a shorter step, before it is chosen, for what ``load`` may do in it.

@@ -68,8 +68,9 @@ def mirror(
 ) -> tuple[Any, MirrorGhosts]:
     """The body with ghosts behind a plane, and the condition that moves them.
 
-    Ghosts are ordinary particles. Those next to the plane need all of their own neighbours, so take ``depth`` = two
-    support radii = 2 · weight.support · dilation · spacing. Two planes: mirror the result again; ghosts of ghosts fill
+    Ghosts are ordinary particles. Those next to the plane need all of their own neighbours, and these theirs, so take
+    ``depth`` = three support radii = 3 · weight.support · dilation · spacing; two are enough where the arrangement is
+    read anew, or dissipation switched off. Two planes: mirror the result again; ghosts of ghosts fill
     the corner.
 
     Args:

@@ -10,7 +10,7 @@ from ..checks import real_array, spread
 from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
-from .base import Assembly, read_only
+from .base import Assembly, check_takes, read_only
 
 
 @functools.cache
@@ -61,6 +61,7 @@ class Value:
         if self.function is None:
             self.rows.assign(self._broadcast(given))
         elif not self.on_device:
+            check_takes(given, 2, f"{who}: value", "lambda x, t: 0.0 * x")
             self._broadcast(
                 given(read_only(assembly.X[indices]), 0.0)
             )  # a wrong function fails now, not in the first step

@@ -1,11 +1,13 @@
 """Shapes as particles."""
 
+from ..options import explain_mistakes
 from .annulus import annulus
 from .filling import BodyCentred, Filling, Lattice, Staggered
 from .lattice import box, nodes
 from .mesh import Patch, mesh
 from .outline import outline
 from .relaxation import Relaxation
+from .repair import Repair
 from .shapes import cylinder, disc, ring, sphere, tube
 
 __all__ = [
@@ -14,6 +16,7 @@ __all__ = [
     "Lattice",
     "Patch",
     "Relaxation",
+    "Repair",
     "Staggered",
     "annulus",
     "box",
@@ -26,3 +29,5 @@ __all__ = [
     "sphere",
     "tube",
 ]
+
+explain_mistakes(__all__, globals())

@@ -118,14 +118,18 @@ def weld(points: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def components(groupings: Sequence[np.ndarray]) -> np.ndarray:
-    """Labels, (k,), equal for those that a grouping, (k,) of numbers from 0, puts together, directly or not."""
+    """Labels, (k,), equal for those that a grouping puts together, directly or not.
+
+    A grouping has numbers of groups, from 0: one for each, (k,), or several, (k, l).
+    """
     labels = np.arange(len(groupings[0]))
     while True:
         before = labels
-        for groups in groupings:
+        for groups in (grouping.reshape(len(labels), -1) for grouping in groupings):
             least = np.full(int(groups.max(initial=0)) + 1, len(labels))
-            np.minimum.at(least, groups, labels)
-            labels = least[groups]
+            for column in groups.T:
+                np.minimum.at(least, column, labels)
+            labels = least[groups].min(axis=1)
         labels = labels[labels]
         if np.array_equal(labels, before):
             return labels

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..checks import real_number
 from ..memory import check_room
 from .filling import Filling, Lattice
 
@@ -88,7 +89,7 @@ def _cells(
     low, high = np.array(lower, dtype=float, ndmin=1), np.array(upper, dtype=float, ndmin=1)
     if low.shape != high.shape or low.ndim != 1 or low.size not in (1, 2, 3):
         raise ValueError(f"lower and upper must both have 1, 2 or 3 components, got {lower} and {upper}")
-    if not (np.isfinite(spacing) and spacing > 0.0):
+    if not (np.isfinite(real_number(spacing, "spacing")) and spacing > 0.0):
         raise ValueError(f"spacing must be positive and finite, got {spacing} m")
     length = high - low
     cells = np.rint(length / (spacing * lengths))

@@ -8,8 +8,10 @@ import numpy as np
 from .filling import Filling, Lattice
 from .outline import read_outline
 from .relaxation import Relaxation
+from .repair import Repair
 from .solid import Solid
 from .surface import read_surface
+from .union import united
 
 
 def mesh(
@@ -19,10 +21,12 @@ def mesh(
     scale: float = 1.0,
     filling: Filling = Lattice(),
     relaxation: Relaxation | None = None,
+    repair: Repair = Repair(),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Particles inside a closed surface, 3-D.
 
-    Inside is where the winding number says so, so that concave and nested surfaces are right.
+    Inside is what any closed piece of the surface encloses: pieces that lie in each other are united, and what is in
+    two of them counts once. A piece that faces inwards is a hollow of the smallest piece around it.
 
     Args:
         file: any mesh that meshio or trimesh reads: STL, OBJ, PLY, VTK, VTU, gmsh; a surface, or solid elements.
@@ -30,27 +34,29 @@ def mesh(
         scale: length of the file's unit [m], 1e-3 for millimetres.
         filling: Lattice(), BodyCentred() or Staggered(), cut to the shape.
         relaxation: Relaxation() to make them even and fit the surface; None leaves the cut filling.
+        repair: what may be mended where the surface is not closed: Repair(weld=…, close=…, turn=…), or that it
+            is to be taken as it is, Repair(take=True).
 
     Returns:
         Positions [m], (n, 3), and volumes [m³], (n,), all equal, whose sum is the volume that the mesh encloses.
 
     Raises:
-        ModuleNotFoundError: meshio is not installed.
+        ModuleNotFoundError: meshio is not installed, or manifold3d where pieces meet or are to be closed.
         OSError: no such file.
-        ValueError: not a mesh, an open surface, parts that lie in each other, nothing inside, or a spacing too coarse.
+        ValueError: not a mesh, an open surface, one that passes through itself, nothing inside, or a spacing too
+            coarse.
     """
-    surface = read_surface(file, scale)
+    surface = read_surface(file, scale, repair)
     who = f"mesh {file}"
+    if repair.take:
+        surface = surface if surface.volume > 0.0 else surface.turned()
+        solid = Solid(*surface.extent, None, surface.query(winding=0.5), surface.query(winding=None))
+        return solid.fill(spacing, filling, relaxation, who)
     surface.check_closed(who)
-    surface.check_apart(who)
-    volume = surface.volume
-    if volume < 0.0:  # all triangles face inwards
-        surface, volume = surface.turned(), -volume
-    corners = surface.points[surface.triangles].reshape(-1, 3)
-    lower, upper = corners.min(axis=0), corners.max(axis=0)
-    if not volume > 1e-9 * np.prod(upper - lower):
-        raise ValueError(f"{who}: the surface must enclose a volume, got {volume:.6g} m^3")
-    solid = Solid(lower, upper, volume, surface.query(winding=True), surface.query(winding=False))
+    if not abs(surface.volume) > 1e-9 * np.prod(np.ptp(surface.extent, axis=0)):
+        raise ValueError(f"{who}: the surface must enclose a volume, got {surface.volume:.6g} m^3")
+    surface = united(surface, who)
+    solid = Solid(*surface.extent, surface.volume, surface.query(winding=0.5), surface.query(winding=None))
     return solid.fill(spacing, filling, relaxation, who)
 
 
@@ -82,5 +88,9 @@ class Patch:
             distance = (lines if self.name is None else lines.part(self.name)).query(inside=False)
         else:
             surface = read_surface(self.file, self.scale)
-            distance = (surface if self.name is None else surface.part(self.name)).query(winding=False)
+            if self.name is not None:
+                surface = surface.part(self.name)
+            elif not len(surface.open_edges()):
+                surface = united(surface, f"mesh {self.file}")  # without what lies within matter
+            distance = surface.query(winding=None)
         return distance(X)[0] <= self.depth

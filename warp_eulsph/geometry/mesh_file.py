@@ -5,11 +5,14 @@ import io
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from ..checks import real_number
 
 # Where meshio keeps the number of a cell's group, by format.
 GROUP_KEYS = ("gmsh:physical", "medit:ref", "cell_tags", "obj:group_ids", "patch")
@@ -54,15 +57,18 @@ def read_mesh(path: str | PathLike, scale: float = 1.0) -> MeshFile:
         raise ModuleNotFoundError("reading meshes needs meshio: pip install 'warp_eulsph[mesh]'") from None
     if not Path(path).is_file():
         raise FileNotFoundError(f"mesh file not found: {path}")
-    if not (np.isfinite(scale) and scale > 0.0):
+    if not (np.isfinite(real_number(scale, "scale")) and scale > 0.0):
         raise ValueError(f"scale must be positive and finite, got {scale}; 1e-3 is a file in millimetres")
     try:
         mesh = _quietly(meshio.read, path)
     except (Exception, SystemExit) as error:  # meshio raises whatever its readers stumble over, and may exit
-        other = _by_trimesh(path, scale)
+        other = _by_trimesh(path, scale) or _by_pyvista(path, scale)
         if other is not None:
             return other
-        raise ValueError(f"{path}: not a mesh that meshio reads ({type(error).__name__}: {error})") from error
+        raise ValueError(
+            f"{path}: not a mesh that meshio reads ({type(error).__name__}: {error}); convert it, by "
+            "gmsh or ParaView for example, to STL, VTU or MSH"
+        ) from error
     if not len(mesh.points) or not any(len(block.data) for block in mesh.cells):
         raise ValueError(f"{path}: a mesh must have corners and cells, got {len(mesh.points)} corners and no cells")
     points = np.zeros((len(mesh.points), 3))
@@ -88,7 +94,9 @@ def _names(field_data: dict[str, Any]) -> dict[tuple[int, int], str]:
     """Names of groups; those of files that tell no dimension count for lines and surfaces."""
     found = {}
     for name, given in field_data.items():
-        tag, *dimension = np.asarray(given).reshape(-1).tolist()
+        if not all(isinstance(number, Integral) for number in np.ravel(np.array(given, dtype=object))):
+            continue  # not what gmsh and others keep there
+        tag, *dimension = np.ravel(given).tolist()
         for of in dimension[:1] or (1, 2):
             found[int(of), int(tag)] = name
     return found
@@ -106,6 +114,21 @@ def _by_trimesh(path: str | PathLike, scale: float) -> MeshFile | None:
     if not len(triangles) or points.shape[1:] != (3,) or not np.isfinite(points).all():
         return None
     return MeshFile(points, {"triangle": triangles}, {"triangle": np.full(len(triangles), -1)}, {})
+
+
+def _by_pyvista(path: str | PathLike, scale: float) -> MeshFile | None:
+    """The same by PyVista, which reads what newer versions of VTK write: the outer surface of solid elements."""
+    try:
+        import pyvista
+
+        read = _quietly(pyvista.read, path)
+        surface = _quietly(lambda: read.extract_surface().triangulate())
+        points, triangles = scale * np.asarray(surface.points, dtype=float), surface.faces.reshape(-1, 4)[:, 1:]
+    except Exception:
+        return None
+    if not len(triangles) or not np.isfinite(points).all():
+        return None
+    return MeshFile(points, {"triangle": np.array(triangles)}, {"triangle": np.full(len(triangles), -1)}, {})
 
 
 def _quietly(read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:

@@ -11,14 +11,19 @@ import numpy as np
 import warp as wp
 
 from ..execution import Launcher
+from .faces import SURFACES
+from .faces import weld as weld_points
 from .filling import Filling, Lattice
-from .mesh_file import read_mesh
+from .mesh_file import MeshFile, read_mesh
 from .relaxation import Relaxation
+from .repair import checked_weld
 from .solid import Solid
-from .surface import Surface
+from .surface import WELD, Surface
 
 # Corners and lines that miss each other by this share of the outline's size are taken to meet.
 SAME = 1e-9
+# Line elements by their nodes in turn.
+_LINES = {"line": [0, 1], "line3": [0, 2, 1]}
 
 
 def outline(
@@ -28,6 +33,7 @@ def outline(
     scale: float = 1.0,
     filling: Filling = Lattice(),
     relaxation: Relaxation | None = None,
+    weld: float | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Particles inside a closed outline, 2-D.
 
@@ -40,6 +46,8 @@ def outline(
         scale: length of the file's unit [m], 1e-3 for millimetres.
         filling: Lattice(), BodyCentred() or Staggered(), cut to the shape.
         relaxation: Relaxation() to make them even and fit the outline; None leaves the cut filling.
+        weld: corners nearer than this are one [m]; None is 1e-6 of the outline's size, and only where it is not closed
+            without; 0 joins only what is equal to the last bit.
 
     Returns:
         Positions [m], (n, 2), and areas [m²], (n,), all equal, whose sum is the area inside.
@@ -49,7 +57,7 @@ def outline(
         OSError: no such file.
         ValueError: not a mesh, not flat, an outline that is open or crosses itself, or a spacing too coarse.
     """
-    lines = read_outline(file, scale)
+    lines = read_outline(file, scale, weld)
     who = f"outline {file}"
     lines.check_closed(who)
     lower, upper = lines.points[lines.segments].min(axis=(0, 1)), lines.points[lines.segments].max(axis=(0, 1))
@@ -71,14 +79,18 @@ class Outline:
     segments: np.ndarray
     patches: dict[str, np.ndarray]
 
+    def loose_ends(self) -> np.ndarray:
+        """Numbers of the corners, (k,), in which an odd number of lines meet; none of a closed outline."""
+        return np.flatnonzero(np.bincount(self.segments.ravel(), minlength=len(self.points)) % 2)
+
     def check_closed(self, who: str) -> None:
         """Raise ValueError unless an even number of lines meet in every corner."""
-        meet = np.bincount(self.segments.ravel(), minlength=len(self.points))
-        loose = np.flatnonzero(meet % 2)
+        loose = self.loose_ends()
         if len(loose):
             raise ValueError(
                 f"{who}: the outline must be closed, got {len(loose)} loose ends, the first at "
-                f"{self.points[loose[0]]} m; close the gaps in a mesh tool"
+                f"{self.points[loose[0]]} m; where corners miss each other join them by weld=..., or close the gaps "
+                "in a mesh tool"
             )
 
     def area(self, who: str) -> float:
@@ -126,7 +138,7 @@ class Outline:
         corners = np.concatenate([np.pad(self.points, ((0, 0), (0, 1)), constant_values=z) for z in (-height, height)])
         a, b = self.segments.T
         walls = np.concatenate([np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)])
-        nearest = Surface(corners, walls, {}).query(winding=False)
+        nearest = Surface(corners, walls, {}).query(winding=None)
         ends = self.points[self.segments]
 
         def distance(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -169,17 +181,19 @@ def _make_crossings() -> Any:
     return crossings
 
 
-def read_outline(path: str | PathLike, scale: float = 1.0) -> Outline:
+def read_outline(path: str | PathLike, scale: float = 1.0, weld: float | None = None) -> Outline:
     """The outline of a mesh file: outer edges of its triangles and quadrangles, or its lines where it has none.
+
+    Elements of second order are cut at their midside nodes. ``weld`` as in ``outline``.
 
     Raises:
         ModuleNotFoundError, OSError: as ``read_mesh``.
         ValueError: as ``read_mesh``, or neither faces nor lines, or not in a plane of constant z.
     """
+    checked_weld(weld)
     file = read_mesh(path, scale)
-    faces = [file.cells[kind] for kind in ("triangle", "quad") if kind in file.cells]
-    lines = file.cells.get("line", np.zeros((0, 2), dtype=int))
-    edges = [face[:, [k, (k + 1) % face.shape[1]]] for face in faces for k in range(face.shape[1])]
+    edges = [_sides(file.cells[kind][:, SURFACES[kind]]) for kind in file.cells if kind in SURFACES]
+    lines, groups = _lines(file)
     used = np.unique(np.concatenate([*(edge.ravel() for edge in edges), lines.ravel()]).astype(int))
     if not len(used):
         kinds = sorted(file.cells)
@@ -190,16 +204,47 @@ def read_outline(path: str | PathLike, scale: float = 1.0) -> Outline:
         raise ValueError(
             f"{path}: an outline must lie in a plane of constant z, got z over {deep:.6g} m; bodies in 3-D are meshes"
         )
-    # Each corner once: files may repeat those of single lines or facets.
-    points, places = np.unique(corners[:, :2], axis=0, return_inverse=True)
     number = np.zeros(len(file.points), dtype=int)
-    number[used] = places.reshape(-1)
-    whole = number[lines][number[lines[:, 0]] != number[lines[:, 1]]]
-    groups = file.groups.get("line", np.zeros(0, dtype=int))[number[lines[:, 0]] != number[lines[:, 1]]]
-    if edges:
-        every = np.sort(number[np.concatenate(edges)], axis=1)
-        distinct, times = np.unique(every, axis=0, return_counts=True)
-        segments = distinct[(times == 1) & (distinct[:, 0] != distinct[:, 1])]
-    else:
-        segments = whole
-    return Outline(points, segments, {file.patch(k, 1): whole[groups == k] for k in np.unique(groups) if k >= 0})
+
+    def joined(tolerance: float) -> Outline:
+        points, number[used] = _corners(corners, tolerance)
+        kept = number[lines[:, 0]] != number[lines[:, 1]]
+        whole, of = number[lines][kept], groups[kept]
+        bounds = _outer(number[np.concatenate(edges)]) if edges else whole
+        return Outline(points, bounds, {file.patch(k, 1): whole[of == k] for k in np.unique(of) if k >= 0})
+
+    exact = joined(weld or 0.0)
+    if weld is not None or not len(exact.loose_ends()):
+        return exact
+    near = joined(WELD * wide)
+    return near if len(near.segments) and not len(near.loose_ends()) else exact
+
+
+def _sides(faces: np.ndarray) -> np.ndarray:
+    """Sides of faces of nodes in turn, (k, 2)."""
+    return np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+
+
+def _lines(file: MeshFile) -> tuple[np.ndarray, np.ndarray]:
+    """Line elements between neighbouring nodes, (k, 2), and their groups, (k,)."""
+    lines, groups = [np.zeros((0, 2), dtype=int)], [np.zeros(0, dtype=int)]
+    for kind, order in ((kind, order) for kind, order in _LINES.items() if kind in file.cells):
+        for pair in pairwise(order):
+            lines.append(file.cells[kind][:, pair])
+            groups.append(file.groups[kind])
+    return np.concatenate(lines), np.concatenate(groups)
+
+
+def _corners(corners: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places in the plane, each once, (k, 2), and which of them each corner is, as files may repeat corners."""
+    points, places = np.unique(corners[:, :2], axis=0, return_inverse=True)
+    if tolerance == 0.0:
+        return points, places.reshape(-1)
+    same = weld_points(np.pad(points, ((0, 0), (0, 1))), tolerance)
+    return points[np.unique(same, return_index=True)[1]], same[places.reshape(-1)]
+
+
+def _outer(edges: np.ndarray) -> np.ndarray:
+    """The edges that are there once, (k, 2)."""
+    distinct, times = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    return distinct[(times == 1) & (distinct[:, 0] != distinct[:, 1])]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import real_number
 from .filling import Filling
 from .lattice import box
 from .relaxation import Relaxation
@@ -22,7 +23,7 @@ class Solid:
     Args:
         lower: lower corner of a box around it [m], (dim,).
         upper: upper corner [m], (dim,).
-        volume: of the shape [m^dim].
+        volume: of the shape [m^dim]; None takes that of the particles of the filling that lie in it.
         depth: positions [m], (k, dim) -> distance to the surface [m], positive inside, (k,), and the unit vectors
             along which it grows, (k, dim); at edges those of one of the faces.
         beneath: the same for positions that lie inside, where it is faster to know that; ``depth`` otherwise.
@@ -30,7 +31,7 @@ class Solid:
 
     lower: np.ndarray
     upper: np.ndarray
-    volume: float
+    volume: float | None
     depth: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
     beneath: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
 
@@ -44,16 +45,18 @@ class Solid:
         Raises:
             ValueError: a spacing that is not positive, or too coarse for the shape.
         """
-        if not (np.isfinite(spacing) and spacing > 0.0):
+        if not (np.isfinite(real_number(spacing, f"{who}: spacing")) and spacing > 0.0):
             raise ValueError(f"{who}: spacing must be positive and finite, got {spacing} m")
-        x, _ = box(self.lower.tolist(), self.upper.tolist(), spacing, filling=filling)
+        x, cell = box(self.lower.tolist(), self.upper.tolist(), spacing, filling=filling)
         x = x[self.depth(x)[0] > ON_SURFACE * spacing]
-        share = self.volume / max(len(x), 1) / spacing ** x.shape[1]
+        volume = len(x) * cell if self.volume is None else self.volume
+        share = volume / max(len(x), 1) / spacing ** x.shape[1]
         if len(x) == 0 or not 1.0 / COARSE < share < COARSE:
             raise ValueError(
                 f"{who}: a spacing of {spacing:.6g} m is too coarse, {len(x)} particles would have to hold "
-                f"{self.volume:.6g} m^{x.shape[1]}; use at least two spacings across the thinnest part"
+                f"{'what is inside' if self.volume is None else f'{volume:.6g} m^{x.shape[1]}'}; use at least two "
+                "spacings across the thinnest part"
             )
         if relaxation is not None:
-            x = relaxation.relax(x, self.volume / len(x), self.depth, self.beneath or self.depth)
-        return x, np.full(len(x), self.volume / len(x))
+            x = relaxation.relax(x, volume / len(x), self.depth, self.beneath or self.depth)
+        return x, np.full(len(x), volume / len(x))

@@ -32,7 +32,7 @@ def make_divergence(space: Space, simd: bool = False) -> Any:
 
 @functools.cache
 def make_tilted_divergence(space: Space) -> Any:
-    """Kernel: −T_a = V_a Σ_b V_b g_ab (t_ab Π_a + t_ba Π_b) ξ, of tilted weights (M17), whose Σ t_ab w_ab ξ is known."""
+    """Kernel: −T_a = V_a Σ_b V_b g_ab (t_ab Π_a + t_ba Π_b) ξ, tilted (M17); its Σ t_ab w_ab ξ is known."""
     vec, mat = space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     separation = difference(space)

@@ -5,10 +5,8 @@ from typing import Any
 
 from ..body import Body
 from ..building import Options
-from ..simulation import Simulation
-from ..transport import Transport
 from .describer import Describer
-from .fields import Recorded
+from .recorded import Recorded, RecordedSolids, RecordedTransport, solids, transport
 
 
 def describe(simulation: Recorded) -> dict[str, Any]:
@@ -25,19 +23,20 @@ def describe(simulation: Recorded) -> dict[str, Any]:
         "dtype": simulation.space.real.__name__,
         "weight": plain(configuration.weight),
         "periodic": [float(length) for length in configuration.lists.box],
-        **(_solids(simulation) if isinstance(simulation, Simulation) else _transport(simulation)),
+        **(_solids(simulation) if solids(simulation) else {}),
+        **(_transport(simulation) if transport(simulation) else {}),
     }
 
 
-def _transport(transport: Transport) -> dict[str, Any]:
-    law, particles = transport.law, transport.particles
+def _transport(simulation: RecordedTransport) -> dict[str, Any]:
+    law, particles = simulation.law, simulation.particles
     return {
         "scheme": plain(law.scheme),
         "flux": plain(law.flux),
-        "time_step": transport.time_step,
-        "exact": plain(transport.exact),
+        "time_step": simulation.time_step,
+        "exact": plain(simulation.exact),
         "particles": {
-            "x": plain(transport.x),
+            "x": plain(simulation.x),
             **{name: plain(getattr(particles, name).numpy()) for name in ("V0", "h")},
             "start": plain(law.start),
             "held": plain(law.held),
@@ -45,7 +44,7 @@ def _transport(transport: Transport) -> dict[str, Any]:
     }
 
 
-def _solids(simulation: Simulation) -> dict[str, Any]:
+def _solids(simulation: RecordedSolids) -> dict[str, Any]:
     stepper = simulation.stepper
     conditions = zip(simulation.boundaries, simulation.conditions, strict=True)
     exchanges = zip(simulation.interactions, simulation.bound_interactions, strict=True)
@@ -72,8 +71,8 @@ def _solids(simulation: Simulation) -> dict[str, Any]:
 def _body(body: Body) -> dict[str, Any]:
     """A body, with those options that it has of its own."""
     options: dict[str, Any] = plain(body)
-    own = {name for name in Options._fields if getattr(body, name) is not None}
-    return {name: value for name, value in options.items() if name in own or name not in Options._fields}
+    seldom = (*Options._fields, "bonded")
+    return {name: value for name, value in options.items() if name not in seldom or getattr(body, name) is not None}
 
 
 def plain(value: Any) -> Any:

@@ -22,6 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from ..checks import instance
 from .atomic import left_behind, move, replace_file
 from .sealed import DamagedError, read_text, seal, unseal
 
@@ -75,7 +76,7 @@ class RunDirectory:
     """
 
     def __init__(self, path: str | PathLike):
-        self.path = Path(path)
+        self.path = Path(instance(path, (str, PathLike), "directory", "'runs/column'"))
         self.snapshots, self.checkpoints, self.probes = (self.path / name for name in ("snap", "ckpt", "probes"))
         self.log, self.pieces, self.description = (self.path / name for name in ("log.jsonl", PIECES, "run.json"))
         self.environment, self.status = self.path / "env.json", self.path / "status.json"
@@ -233,7 +234,7 @@ class RunDirectory:
         replace_file(path, (json.dumps(seal(content), indent=1) + "\n").encode())
 
     def keep(self, name: str, text: str) -> None:
-        """Replace ``case.toml`` or ``case.py``.
+        """Replace ``case.toml``, ``case.py`` or a module that the case names.
 
         Raises:
             OSError: the disk refused; the file is as it was.

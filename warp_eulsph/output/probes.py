@@ -15,7 +15,7 @@ from ..building import options_of
 from ..diagnostics import BodySums, SectionForce
 from ..schedule import EverySteps, Schedule
 from ..scheme.flux import Part
-from ..simulation import Simulation
+from .recorded import RecordedSolids
 from .shape_functions import shape_functions
 from .stress import body_stress, stresses
 
@@ -55,7 +55,7 @@ class Probe(ABC):
         return dict(self.units)
 
     @abstractmethod
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         """What measures; made before the first step, for a run that is resumed too.
 
         Raises:
@@ -83,7 +83,7 @@ class PointProbe(Probe):
         law = _part(self, simulation, self.body).law
         return {**self.units, **{variable.name: variable.unit for variable in law.history}}
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         body, part = _body(self, simulation, self.body), _part(self, simulation, self.body)
         point = np.asarray(self.X, dtype=float)
         if point.shape != (simulation.space.dim,) or not np.isfinite(point).all():
@@ -125,7 +125,7 @@ class BodyProbe(Probe):
         "kinetic": "J",
     }
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         particles = simulation.ranges[_body(self, simulation, self.body).name]
         sums = BodySums(simulation.space, simulation.particles, particles, simulation.device)
         return lambda: dict(sums(simulation.stepper.U))
@@ -142,7 +142,7 @@ class ReactionProbe(Probe):
     boundary: Boundary
     units: ClassVar[dict[str, str]] = {"force": "N"}
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         if self.boundary not in simulation.boundaries:
             raise ValueError(
                 f"probe {self.name!r}: boundary must be one of the simulation's {len(simulation.boundaries)}, "
@@ -169,7 +169,7 @@ class SectionProbe(Probe):
     body: str | None = None
     units: ClassVar[dict[str, str]] = {"force": "N"}
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         body, dim = _body(self, simulation, self.body), simulation.space.dim
         point, normal = (np.asarray(given, dtype=float) for given in (self.point, self.normal))
         if point.shape != (dim,) or normal.shape != (dim,) or not np.linalg.norm(normal) > 0.0:
@@ -188,7 +188,7 @@ class SectionProbe(Probe):
         return lambda: {"force": force(simulation.stepper.forces)}
 
 
-def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
+def _body(probe: Probe, simulation: RecordedSolids, name: str | None) -> Any:
     if name is None:
         return simulation.bodies[0]
     for body in simulation.bodies:
@@ -197,12 +197,12 @@ def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
     raise ValueError(f"probe {probe.name!r}: body must be one of {sorted(simulation.ranges)}, got {name!r}")
 
 
-def _part(probe: Probe, simulation: Simulation, name: str | None) -> Part:
+def _part(probe: Probe, simulation: RecordedSolids, name: str | None) -> Part:
     own = simulation.ranges[_body(probe, simulation, name).name]
     return next(part for span, part in simulation.stepper.remembering if span == own)
 
 
-def _shape_functions(simulation: Simulation, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _shape_functions(simulation: RecordedSolids, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
     options = options_of(body, simulation.options)
     functions = shape_functions(X[None, :], body.x, body.volume, options.dilation * body.spacing, options.weight)

@@ -10,8 +10,8 @@ from ..execution import launch
 from ..linalg import det
 from ..materials import Law, Material
 from ..materials.base import history_row, long_form
-from ..simulation import Simulation
 from ..space import Space, matrix_type
+from .recorded import RecordedSolids
 
 
 @functools.cache
@@ -71,7 +71,7 @@ def stresses(space: Space, n: int, device: Any) -> wp.array:
     return wp.empty(n, dtype=matrix_type(3, 3, space.real), device=device)
 
 
-def stress_array(simulation: Simulation) -> wp.array:
+def stress_array(simulation: RecordedSolids) -> wp.array:
     """σ = P(F) Fᵀ / J [Pa] of the present state by place, (n,) of 3 × 3: M1, the reference being the present.
 
     In 2-D and 1-D the 3-D law acts on F with the missing stretches equal to one, so σ33 of plane strain is there too.
@@ -83,6 +83,6 @@ def stress_array(simulation: Simulation) -> wp.array:
     return sigma
 
 
-def cauchy_stress(simulation: Simulation) -> np.ndarray:
+def cauchy_stress(simulation: RecordedSolids) -> np.ndarray:
     """``stress_array`` on the host, by number, (n, 3, 3)."""
     return simulation.order.by_number(stress_array(simulation).numpy())

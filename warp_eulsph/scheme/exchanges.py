@@ -41,17 +41,15 @@ def _make_work(space: Space) -> Any:
 
 
 @functools.cache
-def _make_book_work(entry_type: Any) -> Any:
-    """Kernel: an interaction's work, which is among those of the external forces, to its own account."""
+def _make_book_work(entry_type: Any, external: int) -> Any:
+    """Kernel: an interaction's work, which is in the entry of the external forces', to its own account."""
     wide = wp.float64
 
     @wp.kernel(module="unique", enable_backward=False)
-    def book_work(
-        k: int, step: wp.array(dtype=wide), works: wp.array(dtype=wide), total: wp.array(dtype=entry_type), i: int
-    ):
+    def book_work(k: int, step: wp.array(dtype=wide), works: wp.array(dtype=wide), total: wp.array(dtype=entry_type)):
         works[k] = works[k] + step[0]
         entry = total[0]
-        entry[i] = entry[i] - step[0]
+        entry[wp.static(external)] = entry[wp.static(external)] - step[0]
         total[0] = entry
 
     return book_work
@@ -87,17 +85,16 @@ class Exchanges:
         """Book a step from velocities ``v_old`` to ``U``, and take it out of entry ``external`` of the others."""
         for k, exchange in enumerate(self._exchanges):
             self._sum(_make_work(self.space), [self.particles, U, v_old, exchange.forces, self.clock], self._step)
-            arguments = [k, self._step, self._works, total, external]
-            self._launch.once(_make_book_work(total.dtype), 1, arguments)
+            self._launch.once(_make_book_work(total.dtype, external), 1, [k, self._step, self._works, total])
 
     def held(self) -> float:
         """Energy that interactions hold [J]; reads the device."""
-        return sum(exchange.energy() for exchange in self._exchanges)
+        return float(sum(exchange.energy() for exchange in self._exchanges))
 
     def accounts(self) -> list[float]:
         """Energy that each added since the start [J], with what it holds; reads the device.
 
         0 where its forces are those of its energy and steps are short, less where it dissipates.
         """
-        works, start = self._works.numpy().tolist(), self._start.numpy().tolist()
-        return [work + each.energy() - then for each, work, then in zip(self._exchanges, works, start, strict=True)]
+        booked = zip(self._exchanges, self._works.numpy().tolist(), self._start.numpy().tolist(), strict=True)
+        return [work + float(exchange.energy()) - start for exchange, work, start in booked]

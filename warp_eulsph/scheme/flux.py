@@ -349,9 +349,9 @@ class Flux:
             elif part.law.update is not None:
                 self._launch(_make_forget(self.space, part.law), part.size, [F, part.constants], part.first)
 
-    def rebase(self, F: wp.array, moving: Sequence[bool]) -> None:
-        """Before a refresh: F and histories of the bodies that are read anew, as the new reference takes them."""
-        for part, moves in zip(self.parts, moving, strict=True):
-            if moves and part.law.rebase is not None:
+    def rebase(self, F: wp.array) -> None:
+        """Before a refresh: F and histories as the new reference takes them."""
+        for part in self.parts:
+            if part.law.rebase is not None:
                 arguments = [part.first, F, part.history, part.constants]
                 self._launch(_make_rebase(self.space, part.law), part.size, arguments, part.first)

@@ -10,13 +10,16 @@ from typing import Any
 
 import warp as wp
 
+from ..boundaries import Bound
+from ..interactions import BoundInteraction
 from .refresh import ByGraph
 from .stepper import Stepper
 
 
 def recordable(stepper: Stepper) -> bool:
     """Whether steps launch kernels only: conditions given as Python functions need the host in every step."""
-    return all(part.recordable for part in (*stepper.conditions, *stepper.interactions))
+    parts: list[Bound | BoundInteraction] = [*stepper.conditions, *stepper.interactions]
+    return all(part.recordable for part in parts)
 
 
 class StepGraphs:

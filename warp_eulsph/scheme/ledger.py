@@ -13,71 +13,29 @@ from ..reduce import Sum, SumOfParticles
 from ..space import Space, matrix_type, vector_type
 from .exchanges import Exchanges
 from .medium import Medium
+from .powers import loads_power, lost, note, powers, work
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "material", "correction", "tie", "limiter", "stepping", "shifting")
+ACCOUNTS = (
+    "external",
+    "constraint",
+    "damping",
+    "dissipation",
+    "material",
+    "correction",
+    "tie",
+    "limiter",
+    "stepping",
+    "shifting",
+)
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _note(space: Space) -> Any:
-    """``wp.func``: keep the end of a step as the start of the next."""
-    vec, State, wide = space.vec, structure(space, "State"), wp.float64
-
-    @wp.func
-    def note(a: int, state: State, W: wp.array(dtype=wide), v_old: wp.array(dtype=vec), W_old: wp.array(dtype=wide)):
-        v_old[a] = state.v[a]
-        W_old[a] = W[a]
-
-    return note
-
-
-@functools.cache
-def _lost(space: Space, inelastic: bool) -> Any:
-    """``wp.func``: energy that the law of a particle dissipated in the step, 0 where none does."""
-    Flux = structure(space, "Flux")
-
-    @wp.func
-    def lost(a: int, flux: Flux) -> wp.float64:
-        if wp.static(inelastic):
-            return wp.float64(flux.dissipated[a])
-        return wp.float64(0.0)
-
-    return lost
-
-
-@functools.cache
-def _powers(space: Space, tied: bool, dragged: bool) -> Any:
-    """``wp.func``: power [W] of the stresses in Q of a particle that are the tie's and the dissipation's."""
-    Flux, precise_mat = structure(space, "Flux"), matrix_type(space.dim, space.dim, wp.float64)
-
-    @wp.func
-    def powers(a: int, flux: Flux, strain_rate: precise_mat) -> wp.vec2d:
-        found = wp.vec2d()
-        if wp.static(tied):
-            found[0] = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
-        if wp.static(dragged):
-            found[1] = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
-        return found
-
-    return powers
-
-
-@functools.cache
-def _work(space: Space) -> Any:
-    """``wp.func``: force · velocity in float64."""
-    vec, precise = space.vec, vector_type(space.dim, wp.float64)
-
-    @wp.func
-    def work(force: vec, v: precise) -> wp.float64:
-        return wp.dot(precise(force), v)
-
-    return work
-
-
-@functools.cache
-def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, inelastic: bool) -> Any:
+def _make_entries(
+    space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, damped: bool, inelastic: bool
+) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
@@ -94,8 +52,9 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
         structure(space, "State"),
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
-    Flux, note, work, lost_of = structure(space, "Flux"), _note(space), _work(space), _lost(space, inelastic)
-    precise, powers = vector_type(space.dim, wp.float64), _powers(space, tied, dragged)
+    Flux, keep, work_of, lost_of = structure(space, "Flux"), note(space), work(space), lost(space, inelastic)
+    precise, pairs_power = vector_type(space.dim, wp.float64), powers(space, tied, dragged)
+    power_of = loads_power(space, damped)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -119,39 +78,39 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
         out: wp.array(dtype=_Entry),
     ):
         block = first + wp.tid()
-        dt = clock.dt[0]
-        total = _Entry()
+        dt, total = clock.dt[0], _Entry()
         for a in range(block * each, wp.min((block + 1) * each, n)):
-            mass = wide(particles.mass[a])
-            v = precise(state.v[a])
+            mass, v = wide(particles.mass[a]), precise(state.v[a])
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
-            of_pairs = powers(a, flux, strain_rate)
+            of_pairs = pairs_power(a, flux, strain_rate)
             strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate) - of_pairs[0] - of_pairs[1]
             lost = lost_of(a, flux)
             stepping = W[a] - W_old[a] + lost - dt * strain_power
-            stepping += dt * work(forces.internal[a], v_mean - precise(half.v[a]))
+            stepping += dt * work_of(forces.internal[a], v_mean - precise(half.v[a]))
             limiter = wide(0.0)
             if wp.static(limited):
                 limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
                 stepping -= dW_limited[a]
             if wp.static(smoothed):
                 stepping += mass * wp.dot(precise(dv[a]), v_mean)
+            loads = power_of(a, forces, v_mean)
             total += wide(particles.share[a]) * _Entry(
-                dt * work(forces.external[a], v_mean),
+                dt * loads[0],
                 wp.dot(impulse, v_mean),
-                dt * (work(forces.dissipation[a], v_mean) - of_pairs[1]),
+                dt * loads[1],
+                dt * (work_of(forces.dissipation[a], v_mean) - of_pairs[1]),
                 -lost,
-                dt * work(forces.correction[a], v_mean),
-                dt * (work(forces.tie[a], v_mean) - of_pairs[0]),
+                dt * work_of(forces.correction[a], v_mean),
+                dt * (work_of(forces.tie[a], v_mean) - of_pairs[0]),
                 limiter,
                 stepping,
                 wide(0.0),
             )
             if dt > wide(0.0):
                 forces.reaction[a] = vec(impulse / dt)
-            note(a, state, W, v_old, W_old)
+            keep(a, state, W, v_old, W_old)
         out[block] = total
 
     return entries
@@ -162,7 +121,7 @@ def _make_shift_entry(space: Space) -> Any:
     """Kernel of ``SumOfParticles``: energy gained since the last entry, all of it by shifting (M15)."""
     vec, Particles, State, wide = space.vec, structure(space, "Particles"), structure(space, "State"), wp.float64
     precise = vector_type(space.dim, wp.float64)
-    last, note = len(ACCOUNTS) - 1, _note(space)
+    last, keep = len(ACCOUNTS) - 1, note(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift_entry(
@@ -182,7 +141,7 @@ def _make_shift_entry(space: Space) -> Any:
             v, before = precise(state.v[a]), precise(v_old[a])
             gain = wide(0.5) * wide(particles.mass[a]) * wp.dot(v - before, v + before) + W[a] - W_old[a]
             total += wide(particles.share[a]) * gain
-            note(a, state, W, v_old, W_old)
+            keep(a, state, W, v_old, W_old)
         entry = _Entry()
         entry[last] = total
         out[block] = entry
@@ -260,6 +219,7 @@ class Ledger:
         clock: DeviceClock,
         device: Any,
         exchanges: Exchanges | None = None,
+        damped: bool = False,
     ):
         n = len(particles.mass)
         self.space, self.particles, self.clock, self.device = space, particles, clock, device
@@ -272,7 +232,7 @@ class Ledger:
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self.start, self._most = 0.0, 0.0
-        self._exchanges = exchanges
+        self._exchanges, self._damped = exchanges, damped
 
     def open(self, U: Any) -> None:
         """Start the books at state ``U``."""
@@ -321,8 +281,8 @@ class Ledger:
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
             arguments += [self.clock.fields, medium.forces]
             tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
-            inelastic = len(flux.fields.dissipated) > 0
-            kernel = _make_entries(self.space, tied, dragged, limiter is not None, smoothed is not None, inelastic)
+            limits, smooths, inelastic = limiter is not None, smoothed is not None, len(flux.fields.dissipated) > 0
+            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped, inelastic)
             self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:

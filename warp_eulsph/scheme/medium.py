@@ -36,8 +36,8 @@ class MediumParts:
         particles: struct ``Particles`` of them.
         flux: of its bodies.
         configuration: its reference k.
-        moving: whether the arrangement of each of its bodies moves with the reference.
         surface_given: the bodies came with their area vectors.
+        groups: number of each body, equal for those that are bonded to each other.
     """
 
     options: Scheme
@@ -46,13 +46,19 @@ class MediumParts:
     particles: Any
     flux: Flux
     configuration: Configuration
-    moving: Sequence[bool]
     surface_given: bool
+    groups: Sequence[int]
 
 
 def is_corrected(options: Scheme, policy: ReferencePolicy, surface_given: bool) -> bool:
     """Whether the scheme's correction is at work: a fixed reference needs it only where surface vectors were given."""
     return options.correction is not None and (surface_given or not policy.fixed)
+
+
+def _check_bonds(groups: Sequence[int], per_body: bool, who: str) -> None:
+    """Raise ValueError where bodies are bonded and something closes its sums body by body."""
+    if per_body and len(set(groups)) < len(groups):
+        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance(), and no shifting")
 
 
 def _held(conditions: Sequence[Bound], span: range) -> np.ndarray:
@@ -75,29 +81,25 @@ class Medium:
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
-        options, n, moving = self.options, self.n, list(parts.moving)
-        self.moving = moving
-        bodies = [body for body, moves in zip(self.flux.bodies, moving, strict=True) if moves]
+        options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
+            _check_bonds(parts.groups, True, "shifting")
             held = _held(conditions, self.span)
-            self.shifter = options.shifting.build(space, self.particles, self.flux, bodies, held, device)
+            self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
         self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
-            if 0 < len(bodies) < len(moving) and not options.correction.by_body:
-                raise ValueError(
-                    f"correction must be Balance() or None where some bodies move and others do not, got "
-                    f"{options.correction}; arrangement=Current() moves all"
-                )
-            self.stabiliser = options.correction.build(space, self.particles, self.flux, bodies, device)
+            _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
+            self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
+        sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            self.pairs = PairPotentials(options.tie, plain, space, self.flux, device)
-        sensed = options.dissipation is not None and options.dissipation.sensor is not None
+            simd = self.configuration.simd and not sensed
+            self.pairs = PairPotentials(options.tie, plain, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
         self.limiter: MassDiffusion | None = None
@@ -138,7 +140,7 @@ class Medium:
 
     def move(self, state: Any) -> None:
         """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
-        self.flux.rebase(self.of(state).F, self.moving)
+        self.flux.rebase(self.of(state).F)
         self.configuration.move(self.of(state))
 
     def renew(self, state: Any) -> None:
@@ -169,8 +171,8 @@ class Medium:
             U = self.of(state)
             self.velocity_gradient(state)
             self.configuration.gradient(self._rows(U.F), self.grad_F)
-            potentials = self.stabiliser.psi  # type: ignore[attr-defined]
-            self.shifter.apply(self.configuration, potentials, U, self.grad_v, self.grad_F, self.clock)
+            psi = self.stabiliser.psi
+            self.shifter.apply(self.configuration, psi, U, self.grad_v, self.grad_F, self.clock)
 
     # the lines of a step
 

@@ -30,6 +30,7 @@ class PairAreas(Correction):
 
     kappa: float = 1.0
     iterations: int = 5
+    per_body = True
 
     def __post_init__(self) -> None:
         if not self.kappa >= 0.0:
@@ -42,7 +43,7 @@ class PairAreas(Correction):
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "ClosedPairs":
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "ClosedPairs":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return ClosedPairs(self, space, particles, flux.bodies, device)
 

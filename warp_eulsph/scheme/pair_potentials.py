@@ -1,12 +1,14 @@
 """What acts between pairs that keep their labels: the tie (M16) and dissipation (M9), forces and stresses in a pass."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
+from ..linalg import inverse
 from ..simd import BY_EIGHT, packed_rows, prelude
 from ..space import Space, difference
 from .dissipation import blend, upwind
@@ -16,14 +18,14 @@ from .tie import Tie
 
 
 def _vectors(space: Space) -> int:
-    """Rows of four: X with the impedance, u, v with the shear impedance, columns of −½(F − I) and of −½∇v."""
+    """Rows of four: X with the impedance, u, v with the shear impedance, columns of −½(F − I) and of −½∇v F⁻¹."""
     return 3 + 2 * space.dim
 
 
 @functools.cache
 def _make_pack(space: Space) -> Any:
     """Kernel: what the SIMD pass reads of a neighbour, side by side."""
-    real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
+    real, vec, mat, dim, invert = space.real, space.vec, space.mat, space.dim, inverse(space)
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     first_H, first_grad = 12, 12 + 4 * dim
 
@@ -39,7 +41,7 @@ def _make_pack(space: Space) -> Any:
         rows: wp.array2d(dtype=real),
     ):
         a = first + wp.tid()
-        X_a, v_a, grad_a = reference.x[a], v[a], grad_v[a]
+        X_a, v_a, grad_a = reference.x[a], v[a], grad_v[a] @ invert(F[a])
         u_a, H_a = x[a] - X_a, F[a] - wp.identity(n=wp.static(dim), dtype=real)
         rows[a, 3] = flux.impedance[a]
         rows[a, 11] = flux.shear_impedance[a]
@@ -59,7 +61,7 @@ def _make_simd(space: Space) -> Any:
     """Kernel of the pass from packed rows, without a sensor."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
+    Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
@@ -92,9 +94,8 @@ def _make_simd(space: Space) -> Any:
             jump[i] = both(B[2], C[2]) - v_a;
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
-                const V along = spread(xi[i], j);
-                apart[i] += (H_a[j] + both(B[3 + j], C[3 + j])) * along;
-                jump[i] += (grad_a[j] + both(B[3 + dim + j], C[3 + dim + j])) * along;
+                apart[i] += (H_a[j] + both(B[3 + j], C[3 + j])) * spread(xi[i], j);
+                jump[i] += (grad_a[j] + both(B[3 + dim + j], C[3 + dim + j])) * spread(now[i], j);
             }}
         }}
         turn(xi, X);
@@ -119,7 +120,7 @@ def _make_simd(space: Space) -> Any:
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
                 tied[i * dim + j] += pull * X[j];
-                dragged[i * dim + j] += push * X[j];
+                dragged[i * dim + j] += push * N[j];
             }}
         }}
     }};
@@ -160,6 +161,7 @@ def _make_simd(space: Space) -> Any:
         reference: Reference,
         near: Neighbours,
         rows: wp.array2d(dtype=real),
+        F: wp.array(dtype=mat),
         modulus: real,
         epsilon: real,
         flux: Flux,
@@ -171,21 +173,35 @@ def _make_simd(space: Space) -> Any:
         sum_pairs(
             a, begin, end, near.index, near.w, near.box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag
         )
+        flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
         flux.Q[a] = flux.Q[a] + flux.tie[a] + flux.drag[a]
 
     return pair_potentials_simd
 
 
 @functools.cache
+def _make_spatial(space: Space) -> Any:
+    """Kernel: ∇v F⁻¹, the gradient of v in the present configuration."""
+    mat, invert = space.mat, inverse(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def spatial(first: int, F: wp.array(dtype=mat), grad_v: wp.array(dtype=mat), out: wp.array(dtype=mat)):
+        a = first + wp.tid()
+        out[a] = grad_v[a] @ invert(F[a])
+
+    return spatial
+
+
+@functools.cache
 def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
-    """Kernel of the pass; M9 where ``damped``, its jumps where ``sensed`` reconstructed only where v is smooth.
+    """Kernel of the pass; M9 where ``damped``, of D = ∇v F⁻¹, reconstructed only where v is smooth if ``sensed``.
 
     What is not reconstructed leaves no stress. Π is kept with ``dual``.
     """
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
-    separation, pair_force, mix = difference(space), upwind(space), blend(space)
+    separation, pair_force, mix, invert = difference(space), upwind(space), blend(space), inverse(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def pair_potentials(
@@ -195,7 +211,7 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
         x: wp.array(dtype=vec),
         F: wp.array(dtype=mat),
         v: wp.array(dtype=vec),
-        grad_v: wp.array(dtype=mat),
+        D: wp.array(dtype=mat),
         sensor: wp.array(dtype=vec),
         modulus: real,
         epsilon: real,
@@ -208,13 +224,14 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], reference.x[a], near.box)
-            now = separation(x[b], x[a], near.box)
+            # by displacements: in a periodic box the nearest image of a strained pair may be another
+            now = xi + ((x[b] - reference.x[b]) - (x[a] - reference.x[a]))
             pull = (now - (F[a] + F[b]) @ (xi * real(0.5))) * (modulus * near.w[k])
             tie += pull
             tied += wp.outer(pull, xi)
             if wp.static(damped):
                 plain = v[b] - v[a]
-                smooth = (plain - (grad_v[a] + grad_v[b]) @ (xi * real(0.5))) * epsilon
+                smooth = (plain - (D[a] + D[b]) @ (now * real(0.5))) * epsilon
                 jump = smooth
                 if wp.static(sensed):
                     jump = mix(smooth, plain, real(1.0), sensor[a], sensor[b])
@@ -222,13 +239,13 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
                 Z = flux.impedance[a] + flux.impedance[b]
                 Z_shear = flux.shear_impedance[a] + flux.shear_impedance[b]
                 drag += pair_force(xi, now, near.w[k], Z, Z_shear, jump)
-                dragged += wp.outer(pair_force(xi, now, near.w[k], Z, Z_shear, smooth), xi)
+                dragged += wp.outer(pair_force(xi, now, near.w[k], Z, Z_shear, smooth), now)
         forces.tie[a] = tie * reference.V[a]
         flux.tie[a] = tied * real(-0.5)
         flux.Q[a] = flux.Q[a] + flux.tie[a]
         if wp.static(damped):
             forces.dissipation[a] = drag * reference.V[a]
-            flux.drag[a] = dragged * real(-0.5)
+            flux.drag[a] = (dragged * real(-0.5)) @ wp.transpose(invert(F[a]))
             flux.Q[a] = flux.Q[a] + flux.drag[a]
         if wp.static(dual):
             flux.Pi[a] = flux.Q[a] @ wp.transpose(reference.L[a])
@@ -239,22 +256,29 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
 class PairPotentials:
     """The pass at work on a medium whose arrangement does not move: a stress beside every force.
 
-    The forces are derivatives of a potential of positions and F, and of one of velocities and ∇v. What they do to F and
-    ∇v goes through the stress, so that momentum, angular momentum and energy find all of it.
+    The forces are derivatives of a potential of positions and F (M16), and of one of velocities and ∇v F⁻¹ (M9) with
+    the pairs as they are now. What they do to F goes through the stress, so that energy and both momenta find all of
+    it; neither potential knows of a rotation.
 
     Args:
         tie: None ties nothing.
         damped: whether M9 is among them; where a correction changes M5 (M10 to M12), M9 comes with that.
+        simd: whether the pass runs by SIMD kernels, which know of no sensor.
+        groups: number of each body, equal for those that are bonded: they have the modulus of the softest, so that
+            pairs across the joint find the same at both ends.
     """
 
-    def __init__(self, tie: Tie | None, damped: bool, space: Space, flux: Flux, device: Any):
-        self.space, self.flux, self.damped, self._launch = space, flux, damped, Launcher(device)
+    def __init__(
+        self, tie: Tie | None, damped: bool, simd: bool, space: Space, flux: Flux, groups: Sequence[int], device: Any
+    ):
+        self.space, self.flux, self._launch = space, flux, Launcher(device)
+        self._damped, self._simd = damped, simd and damped
         n = len(flux.fields.Q)
-        self._bodies = [
-            (body, tie.modulus(M, mu, space.dim) if tie is not None else 0.0)
-            for body, (M, mu) in zip(flux.bodies, flux.moduli(), strict=True)
-        ]
-        self._rows = packed_rows(space, n, _vectors(space) if damped else 0, device)
+        moduli = [tie.modulus(M, mu, space.dim) if tie is not None else 0.0 for M, mu in flux.moduli()]
+        softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
+        self._bodies = list(zip(flux.bodies, softest, strict=True))
+        self._rows = packed_rows(space, n if self._simd else 0, _vectors(space), device)
+        self._D = wp.zeros(n if damped and not self._simd else 0, dtype=space.mat, device=device)
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
         if damped:
             flux.fields.drag = wp.zeros(n, dtype=space.mat, device=device)
@@ -271,14 +295,16 @@ class PairPotentials:
     ) -> None:
         """Forces [N] at x and F of ``state``, ``v`` and ``grad_v``, and their stresses, which are added to Q."""
         reference, near, flux = configuration.fields, configuration.near, self.flux.fields
-        if configuration.simd and self.damped and sensor is None:
+        if self._simd:
             arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
             self._launch(_make_pack(self.space), len(v), arguments)
             for body, modulus in self._bodies:
-                arguments = [reference, near, self._rows, modulus, epsilon, flux, forces]
+                arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
                 self._launch(_make_simd(self.space), len(body), arguments, body.start)
             return
-        kernel = _make_portable(self.space, self.damped, sensor is not None, len(flux.Pi) > 0)
+        if self._damped:
+            self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
+        kernel = _make_portable(self.space, self._damped, sensor is not None, len(flux.Pi) > 0)
         for body, modulus in self._bodies:
-            arguments = [reference, near, state.x, state.F, v, grad_v, v if sensor is None else sensor]
+            arguments = [reference, near, state.x, state.F, v, self._D, v if sensor is None else sensor]
             self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)

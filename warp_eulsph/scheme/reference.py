@@ -1,7 +1,6 @@
 """The reference configuration k: positions, volumes, corrections and neighbour lists in which weights live."""
 
 import functools
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -144,12 +143,9 @@ def _make_defect(space: Space) -> Any:
 class Configuration:
     """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
 
-    Nothing in it moves (``fixed``) where ``moving`` is empty.
-
     Args:
         box: lengths of the periodic box [m], zero where open.
-        moving: the particles whose arrangement a refresh reads anew, all by default; the others keep that of the
-            start, F_k = I.
+        fixed: it is that of the start for good, F_k = I.
         corrected: something changes L or the pair vectors after M3 (M10 to M13). Where nothing does and the reference
             is fixed (``plain``), arrays of the same values are one.
         tilt: of the weights (M17), where the reference is plain.
@@ -169,24 +165,21 @@ class Configuration:
         box: Any,
         device: Any,
         *,
-        moving: Sequence[range] | None = None,
+        fixed: bool = False,
         corrected: bool = True,
         tilt: Tilt | None = None,
     ):
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
-        fixed = moving is not None and not moving
         self.fixed, self.plain = fixed, fixed and not corrected
         self.tilt = tilt if self.plain else None
-        self._adopting: Sequence[range] = [range(n)]  # all at the start, then those that move
-        self._moving = [range(n)] if moving is None else moving
         self.simd, self._launch = simd(device), Launcher(device)
         empty = {"F" if fixed else "resolution"} | (set() if self.tilt else {"moment"})
         self.fields = allocate(space, "Reference", n, device, empty=empty)
         if self.plain:
             self.fields.balanced = self.fields.x
         tilted = self.tilt is not None
-        self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device, tilted)
+        self.lists = NeighbourLists(space, weight, self.fields.h, particles.group, box, device, tilted)
         self.K = self.fields.L if self.plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
@@ -203,10 +196,7 @@ class Configuration:
 
     def move(self, state: Any) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
-        for body in self._adopting:
-            arguments = [state, self.particles, self.fields]
-            self._launch(_make_adopt(self.space, self.fixed), len(body), arguments, body.start)
-        self._adopting = self._moving
+        self._launch(_make_adopt(self.space, self.fixed), len(self.K), [state, self.particles, self.fields])
         self.lists.count_neighbours(self.fields.x)
 
     def renew(self) -> None:

@@ -49,11 +49,9 @@ class Shifting:
                 f"shifting bound must be in (0, 0.25] spacings, got {self.bound}; 0.05 is the tested value"
             )
 
-    def build(
-        self, space: Space, particles: Any, flux: Flux, moving: list[range], held: np.ndarray, device: Any
-    ) -> "Shifter":
+    def build(self, space: Space, particles: Any, flux: Flux, held: np.ndarray, device: Any) -> "Shifter":
         """Allocate; ``held`` are places of particles that stay, (k,)."""
-        return Shifter(self, space, particles, flux, moving, held, device)
+        return Shifter(self, space, particles, flux, held, device)
 
 
 @functools.cache
@@ -178,19 +176,14 @@ class Shifter:
         space: Space,
         particles: Any,
         flux: Flux,
-        moving: list[range],
         held: np.ndarray,
         device: Any,
     ):
         self.option, self.space, self.particles, self.device = option, space, particles, device
         n, self._launch = len(particles.mass), Launcher(device)
         self._moved = wp.zeros(n, dtype=space.vec, device=device)
-        starts = {body.start for body in moving}
-        remembering = [part for part in flux.parts if part.law.history and part.first in starts]
-        self._remaps = [Remap(space, part, n, device) for part in remembering]
-        free = np.zeros(n, dtype=np.int32)
-        for body in moving:
-            free[body.start : body.stop] = 1
+        self._remaps = [Remap(space, part, n, device) for part in flux.parts if part.law.history]
+        free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)

@@ -76,6 +76,10 @@ class Stepper(World, ABC):
             self.forces.external.zero_()
         for condition in self.conditions:
             condition.load(state, self.clock.fields, fraction, self.forces.external)
+        if self.damped:
+            self.forces.damping.zero_()
+            for condition in self.conditions:
+                condition.damp(state, self.clock.fields, self.forces)
         for interaction, exchanged in zip(self.interactions, self.exchanged, strict=True):
             exchanged.zero_()
             interaction.forces(self, state, fraction, exchanged)

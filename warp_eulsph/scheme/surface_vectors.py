@@ -25,8 +25,9 @@ class SurfaceVectors(Correction):
     """
 
     project: bool = False
+    per_body = True
 
-    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "SurfaceForces":
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "SurfaceForces":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return SurfaceForces(self, space, particles, flux.bodies, device)
 

@@ -18,7 +18,7 @@ class TimeStep:
     """Δt = CFL · min spacing/c, wave speeds c of the current state and spacings h_k/dilation measured in the reference.
 
     Particles with a poor neighbourhood (an L_a beyond those of jittered corners) ask for a smaller step, and so do
-    those that strain fast: |∇v| Δt is at most CFL/4. So do conditions (``Bound.limit``): with frequencies ω beside
+    those that strain fast: ∇v Δt is at most CFL/4. So do conditions (``Bound.limit``): with frequencies ω beside
     those of the waves, 2c/spacing at most, it is Δt = CFL/√(max (c/spacing)² + Σ (ω/2)²).
 
     Args:

@@ -77,17 +77,19 @@ class World:
         for medium in self.media:
             medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
         self._start([each.surface_given for each in parts.media])
-        self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges())
+        self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
 
     def _allocate_forces(self) -> Any:
         """Struct ``Forces``, where those that are always zero take the memory of one."""
         n, vec, device = self.n, self.space.vec, self.device
-        self.loaded = bool(self.interactions) or any(condition.loads for condition in self.conditions)
+        self.damped = any(condition.damps for condition in self.conditions)
+        self.loaded = self.damped or bool(self.interactions) or any(condition.loads for condition in self.conditions)
         there = {
             "correction": any(medium.stabiliser.corrects for medium in self.media),
             "tie": any(medium.pairs is not None for medium in self.media),
             "external": self.loaded,
+            "damping": self.damped,
         }
         forces = allocate(self.space, "Forces", n, device, empty=there)
         self._zero = wp.zeros(1, dtype=vec, device=device)
@@ -167,9 +169,11 @@ class World:
             name = "" if len(self.media) == 1 else f"Medium.{k}."
             listed.append({name + own: array for own, array in medium.evolving().items()})
         listed += [self.clock.evolving(), self.ledger.evolving()]
-        for kind, parts in (("Condition", self.conditions), ("Interaction", self.interactions)):
-            for i, part in enumerate(parts):
-                listed.append({f"{kind}.{i}.{name}": array for name, array in part.evolving().items()})
+        parts: list[tuple[str, Bound | BoundInteraction]] = []
+        parts += [(f"Condition.{i}", condition) for i, condition in enumerate(self.conditions)]
+        parts += [(f"Interaction.{i}", interaction) for i, interaction in enumerate(self.interactions)]
+        for own, part in parts:
+            listed.append({f"{own}.{name}": array for name, array in part.evolving().items()})
         return {name: array for held in listed for name, array in held.items()}
 
     @property

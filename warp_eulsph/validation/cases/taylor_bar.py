@@ -15,11 +15,11 @@ import numpy as np
 from ...boundaries import mirror
 from ...geometry import cylinder
 from ...materials import J2, LinearHardening
-from ...output import Figure
 from ...scheme.arrangement import Arrangement, Convected, Current
 from ...scheme.policy import Always, Never, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
+from ..report import Figure
 
 RADIUS, LENGTH, SPEED, END = 3.2e-3, 32.4e-3, 227.0, 80e-6  # m, m, m/s, s
 COPPER = J2(density=8930.0, young=117e9, poisson=0.35, hardening=LinearHardening(yield_stress=0.4e9, modulus=0.1e9))
