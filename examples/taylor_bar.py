@@ -15,6 +15,7 @@ import numpy as np
 import warp_eulsph as es
 from warp_eulsph.geometry import cylinder
 from warp_eulsph.materials import J2, LinearHardening
+from warp_eulsph.output import SnapshotWriter
 from warp_eulsph.validation import Figure, table
 from warp_eulsph.validation.cases.taylor_bar import END, FORMS, measure
 
@@ -22,12 +23,11 @@ COPPER = J2(density=8930.0, young=117e9, poisson=0.35, hardening=LinearHardening
 RADIUS, LENGTH = 3.2e-3, 32.4e-3  # m
 
 
-def build(n: int, form: str) -> es.Simulation:
+def build(n: int, reference: es.ReferencePolicy, arrangement: es.Current | es.Convected) -> es.Simulation:
     """The rod above the wall z = 0, n particles per radius; ghosts behind the wall, as deep as the rod is wide."""
     x, volume = cylinder((0.0, 0.0, 0.0), (0.0, 0.0, LENGTH), RADIUS, RADIUS / n)
     rod = es.Body(x=x, volume=volume, material=COPPER, velocity=[0.0, 0.0, -227.0], name="rod")
     rod, wall = es.mirror(rod, point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, -1.0), depth=2.0 * RADIUS)
-    reference, arrangement = FORMS[form]
     return es.Simulation(rod, boundaries=[wall], reference=reference, arrangement=arrangement)
 
 
@@ -72,13 +72,13 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("--form", choices=FORMS, default="eulerian")
     parser.add_argument("--output", type=Path, default=Path("runs/taylor_bar"))
     args = parser.parse_args(argv)
-    simulation = build(args.n, args.form)
-    simulation.run(END)
-    args.output.mkdir(parents=True, exist_ok=True)
+    simulation, writer = build(args.n, *FORMS[args.form]), SnapshotWriter(args.output)
+    simulation.run(END, every=10e-6, output=writer)
+    writer.derive()
     draw(simulation, args.output / "taylor_bar.png")
     checked = figures(measure(simulation, args.n))
     print(table(checked))
-    print(f"picture {args.output / 'taylor_bar.png'}")
+    print(f"picture {args.output / 'taylor_bar.png'}, snapshots {writer.series}")
     outside = [figure.name for figure in checked if not figure.accepted]
     if outside:
         raise SystemExit(f"outside the accepted band: {outside}")
