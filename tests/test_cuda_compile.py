@@ -3,6 +3,8 @@
 No GPU: Warp's ahead-of-time compiler needs no driver. ``-s`` prints the registers of each kernel.
 """
 
+import dataclasses
+
 import pytest
 import warp as wp
 from bodies import block
@@ -10,6 +12,7 @@ from cubin import usage
 
 import warp_eulsph as es
 from warp_eulsph import execution
+from warp_eulsph.materials import J2, JohnsonCook
 
 CASES = [
     pytest.param(3, wp.float32, 90),
@@ -17,6 +20,23 @@ CASES = [
     pytest.param(2, wp.float64, 80, marks=pytest.mark.slow),
     pytest.param(3, wp.float64, 90, marks=pytest.mark.slow),
 ]
+
+
+def problems(dim, dtype):
+    """Simulations whose steps launch all kinds of kernels: of the forms of the scheme, and of matter that yields."""
+    body, fixed = block(dim, 5), es.Fixed(lambda X: X[:, 0] < 0.2)
+    for scheme, reference in (
+        (es.Verlet(), es.Always()),
+        (es.Verlet(), es.Never()),
+        (es.LaxWendroff(smoothing=es.LinearExact()), es.Always()),
+    ):
+        yield es.Simulation(body, boundaries=[fixed], reference=reference, scheme=scheme, dtype=dtype)
+    hardening = JohnsonCook(A=90e6, B=292e6, n=0.31, C=0.025, m=1.09)
+    copper = J2(density=8930.0, young=117e9, poisson=0.35, hardening=hardening)
+    yielding = dataclasses.replace(body, material=copper, velocity=100.0 * body.x)
+    even = {"arrangement": es.Current(), "scheme": es.Verlet(shifting=es.Shifting())}
+    for options in ({}, even):
+        yield es.Simulation(yielding, boundaries=[fixed], dtype=dtype, **options)
 
 
 @pytest.mark.parametrize(("dim", "dtype", "arch"), CASES)
@@ -30,13 +50,7 @@ def test_kernels_of_a_step_compile_and_do_not_spill(dim, dtype, arch, monkeypatc
 
     monkeypatch.setattr(wp, "launch", recording_launch)
     monkeypatch.setattr(execution, "_simd", False)  # the portable kernels, which GPUs run
-    body, fixed = block(dim, 5), es.Fixed(lambda X: X[:, 0] < 0.2)
-    for scheme, reference in (
-        (es.Verlet(), es.Always()),
-        (es.Verlet(), es.Never()),
-        (es.LaxWendroff(smoothing=es.LinearExact()), es.Always()),
-    ):
-        simulation = es.Simulation(body, boundaries=[fixed], reference=reference, scheme=scheme, dtype=dtype)
+    for simulation in problems(dim, dtype):
         simulation.step(2)
         simulation.energy()
         simulation.momentum()

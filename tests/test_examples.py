@@ -92,6 +92,13 @@ def test_punch(run):
     assert figures["reaction at 10 ms [MN/m]"] == pytest.approx(3.15, rel=0.1)
 
 
+def test_taylor_bar(run):
+    figures, frames = run("taylor_bar", "-n", "4")
+    assert frames == 9
+    assert figures["length [mm]"] == pytest.approx(21.55, abs=0.2)
+    assert 6.8 < figures["foot radius [mm]"] < 7.3
+
+
 def test_failed_check_ends_the_example(run):
     """Six particles along the block's side are too few for the reaction at 15 ms."""
     with pytest.raises(SystemExit, match=r"outside the accepted band: .*'reaction at 15 ms"):
@@ -107,6 +114,7 @@ def test_failed_check_ends_the_example(run):
         ("bending_column", (3, 2, es.Always())),
         ("twisting_column", (2, es.Always())),
         ("punch", (6, es.Always())),
+        ("taylor_bar", (3, es.Always(), es.Current())),
     ],
 )
 def test_set_up_is_shown_and_is_the_one_that_is_validated(name, arguments, monkeypatch):
@@ -120,7 +128,7 @@ def test_set_up_is_shown_and_is_the_one_that_is_validated(name, arguments, monke
         built = module.build(*arguments)
         described = describe(built[0] if isinstance(built, tuple) else built)
         for boundary in described["boundaries"].values():  # told by source, which differs in names
-            boundary.pop("region"), boundary.pop("value", None)
+            boundary.pop("region", None), boundary.pop("value", None)
         descriptions.append(described)
     assert descriptions[0] == descriptions[1]
 

@@ -17,13 +17,14 @@ from scipy.optimize import brentq
 import warp_eulsph as es
 from warp_eulsph import materials
 from warp_eulsph.linalg import det
-from warp_eulsph.materials import Law, Material
+from warp_eulsph.materials import Law, Material, Variable
+from warp_eulsph.materials.base import history_row, long_form
 from warp_eulsph.space import Space
 
 RUBBER = {"density": 1100.0, "young": 17e6, "poisson": 0.45}
 # A value for every parameter that any material declares, all for rubber of shear modulus 5.8621e6 Pa, ν = 0.45.
 PARAMETERS = {**RUBBER, "shear": 5.862069e6, "bulk": 5.666667e7, "c10": 2.0e6, "c01": 0.9310345e6}
-PARAMETERS |= {"sound_speed": 242.1, "gamma": 7.0}
+PARAMETERS |= {"sound_speed": 242.1, "gamma": 7.0, "hardening": materials.LinearHardening(yield_stress=1e6)}
 
 for module in pkgutil.iter_modules(materials.__path__):
     importlib.import_module(f"{materials.__name__}.{module.name}")
@@ -56,35 +57,36 @@ DOUBLE = [case for case in CASES if case.values[1].real is wp.float64]
 def make_point_functions(space: Space, law: Law) -> Any:
     """Kernel: the point functions of a law at each F."""
     real, mat, pair, Constants = space.real, space.mat, space.row(2), law.Constants
-    stress_of, energy_of, moduli_of = law.stress, law.energy, law.wave_moduli
+    long, row = long_form(space, law), history_row(space, law)
+    stress_of, energy_of, moduli_of = long.stress, long.energy, long.wave_moduli
 
     @wp.kernel(module="unique", enable_backward=False)
     def point_functions(
         F: wp.array(dtype=mat),
+        start: wp.array(dtype=row),
         c: Constants,
         P: wp.array(dtype=mat),
         psi: wp.array(dtype=real),
         moduli: wp.array(dtype=pair),
     ):
         i = wp.tid()
-        P[i] = stress_of(F[i], c)
-        psi[i] = energy_of(F[i], c)
-        moduli[i] = moduli_of(F[i], c)
+        P[i] = stress_of(F[i], mat(), start[0], real(0.0), c)
+        psi[i] = energy_of(F[i], start[0], c)
+        moduli[i] = moduli_of(F[i], start[0], c)
 
     return point_functions
 
 
 def evaluate(material: Material, space: Space, F: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """P (…, d, d), Ψ (…,), wave moduli (…, 2) at F (…, d, d)."""
+    """P (…, d, d), Ψ (…,), wave moduli (…, 2) at F (…, d, d), of what remembers nothing yet."""
     law, dim = material.law(space), space.dim
-    constants = law.Constants()
-    for name, value in material.constants().items():
-        setattr(constants, name, value)
+    constants, row = material.filled_constants(law), history_row(space, law)
+    start = wp.array([row(*law.start)], dtype=row)
     shape = F.shape[:-2]
     flat = wp.array(F.reshape(-1, dim, dim).astype(space.numpy), dtype=space.mat)
     n = len(flat)
     out = [wp.zeros(n, dtype=kind) for kind in (space.mat, space.real, space.row(2))]
-    wp.launch(make_point_functions(space, law), n, [flat, constants, *out])
+    wp.launch(make_point_functions(space, law), n, [flat, start, constants, *out])
     P, psi, moduli = (array.numpy().astype(float) for array in out)
     return P.reshape(*shape, dim, dim), psi.reshape(shape), moduli.reshape(*shape, 2)
 
@@ -260,7 +262,7 @@ def test_nonlinear_uniaxial_piston():
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Remembering(materials.NeoHookean):
-    """Neo-Hookean that remembers its largest and smallest J − 1; changes nothing else."""
+    """Neo-Hookean that remembers its largest and smallest J, and says it lost a joule per m² each step; no more."""
 
     def law(self, space: Space) -> Law:
         return remembering_law(self, space)
@@ -270,13 +272,27 @@ class Remembering(materials.NeoHookean):
 def remembering_law(material: Remembering, space: Space) -> Law:
     real, mat, row = space.real, space.mat, space.row(2)
     determinant, base = det(space), materials.NeoHookean.law(material, space)
+    stress_of, energy_of, moduli_of = base.stress, base.energy, base.wave_moduli
+    history = (Variable("largest", "-", "J", 1.0), Variable("least", "-", "J", 1.0, 0.0))
 
     @wp.func
-    def carry(F: mat, history: row, c: base.Constants):
-        e = determinant(F) - real(1.0)
-        return F, row(wp.max(history[0], e), wp.min(history[1], e))
+    def stress(F: mat, rate: mat, h: row, dt: real, c: base.Constants) -> mat:
+        return stress_of(F, c)
 
-    return base._replace(carry=carry, history=2)
+    @wp.func
+    def energy(F: mat, h: row, c: base.Constants) -> real:
+        return energy_of(F, c)
+
+    @wp.func
+    def wave_moduli(F: mat, h: row, c: base.Constants) -> row:
+        return moduli_of(F, c)
+
+    @wp.func
+    def update(F: mat, rate: mat, h: row, dt: real, c: base.Constants):
+        J = determinant(F)
+        return F, row(wp.max(h[0], J), wp.min(h[1], J)), real(1.0)
+
+    return Law(base.Constants, stress, energy, wave_moduli, update, history=history)
 
 
 def vibrating_body(material: Material, name: str, offset: float) -> es.Body:
@@ -291,17 +307,23 @@ def test_history_is_kept_per_body_and_changes_nothing_else():
         vibrating_body(Remembering(**RUBBER), "b", 3.0),
     ]
     simulation = es.Simulation(bodies)
-    largest, smallest = np.zeros(16), np.zeros(16)
+    largest, smallest = np.ones(16), np.ones(16)
     for _ in range(30):
         plain.step()
         simulation.step()
-        largest = np.maximum(largest, simulation.J[16:] - 1.0)
-        smallest = np.minimum(smallest, simulation.J[16:] - 1.0)
-    assert simulation.stepper.flux.histories[0] is None
-    history = simulation.stepper.flux.histories[1].numpy()
-    np.testing.assert_allclose(history, np.stack([largest, smallest], axis=1), atol=1e-14)
-    assert smallest.max() < -1e-3  # the body was compressed at all
+        largest = np.maximum(largest, simulation.J[16:])
+        smallest = np.minimum(smallest, simulation.J[16:])
+    assert np.isnan(simulation.history("least")[:16]).all()
+    np.testing.assert_allclose(simulation.history("largest")[16:], largest, atol=1e-14)
+    np.testing.assert_allclose(simulation.history("least")[16:], smallest, atol=1e-14)
+    assert smallest.max() < 1.0 - 1e-3  # the body was compressed at all
     assert np.array_equal(simulation.x, plain.x)
+    said, books = simulation.energy(), plain.energy()
+    assert said["material"] == pytest.approx(-30.0 * 0.16, rel=1e-12) and books["material"] == 0.0
+    assert said["stepping"] - books["stepping"] == pytest.approx(30.0 * 0.16, rel=1e-9)
+    assert abs(said["residual"]) < 1e-12 * said["total"]
+    with pytest.raises(ValueError, match=r"history must be one of \['largest', 'least'\].* got 'most'"):
+        simulation.history("most")
 
 
 def liquid(rate: np.ndarray) -> es.Body:

@@ -31,7 +31,7 @@ class KickThenDriftStepper(Stepper):
         U, half = self.U, self.half
         self._velocity_gradient(U)
         self._choose_dt(U)
-        self._stress(U)
+        self._stress(U, 0.0)
         self._sum_forces(U, U, 0.0)
         self._kick(U)
         self._impose(U, 1.0)
@@ -40,7 +40,7 @@ class KickThenDriftStepper(Stepper):
         half.v.assign(U.v)
         self._drift(U, U, 1.0, U)
         self._release(U)
-        self._carry(U)
+        self._update(U)
         self._check(U)
         self.ledger.record(U, half)
         self.clock.tick()

@@ -334,18 +334,18 @@ def test_wrong_regions_are_told_before_files_move(tmp_path):
     assert contents(tmp_path) == before
 
 
-def test_wrong_probes_are_told_before_files_move(tmp_path):
+def test_wrong_probes_and_fields_are_told_before_files_move(tmp_path):
     run(tmp_path, until=1e-4)
     before = contents(tmp_path)
     simulation = plate()
     with pytest.raises(ValueError, match="must lie in body 'plate'"):
         record(simulation, tmp_path, 1e-3, Recording(probes=[PointProbe(name="far", X=(9, 9))]), replace=True)
+    with pytest.raises(ValueError, match=r"fields must be among .* got \['vellocity'\]"):
+        record(simulation, tmp_path, 1e-3, Recording(fields=["vellocity"]), replace=True)
     assert contents(tmp_path) == before
 
 
 def test_bad_recordings_are_named():
-    with pytest.raises(ValueError, match=r"fields must be among .* got \['vellocity'\]"):
-        Recording(fields=["vellocity"])
     with pytest.raises(ValueError, match="dtype must be"):
         Recording(dtype=np.float16)
     with pytest.raises(ValueError, match="names of probes must differ"):

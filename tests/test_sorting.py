@@ -125,7 +125,7 @@ def test_periodic_images_are_sorted_into_the_box():
 def test_histories_of_materials_change_places():
     material = Remembering(density=1100.0, young=17e6, poisson=0.45)
     whole, mixed = undisturbed_and_shuffled(lambda **options: two_blocks(material=material, **options))
-    history, kept = (simulation.stepper.flux.histories[1].numpy() for simulation in (mixed, whole))
+    history, kept = (simulation.stepper.flux.parts[1].history.numpy() for simulation in (mixed, whole))
     places = mixed.order.places[64:] - 64
     assert np.ptp(kept) > 1e-4 and not np.allclose(history, kept)
     np.testing.assert_allclose(history[places], kept, atol=1e-9)

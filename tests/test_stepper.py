@@ -71,7 +71,7 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
         stepper.flux.keep_dual()
         stabiliser.refresh(stepper.configuration, stepper.U)
         stepper._velocity_gradient(stepper.U)
-        stepper._stress(stepper.U)
+        stepper._stress(stepper.U, 0.0)
         U = stepper.U
         arguments = [stepper.configuration, stepper.flux.fields, U.x, U.v, stepper.grad_v, 1.0, None, stepper.forces]
         stabiliser.compute(*arguments)
@@ -104,7 +104,7 @@ def test_uniform_stress_acts_on_the_surface_vectors_only():
         stepper.U.F.assign(np.broadcast_to(1.05 * np.eye(2), (144, 2, 2)))
         stepper.configuration.refresh(stepper.U)
         stepper.stabiliser.refresh(stepper.configuration, stepper.U)
-        stepper._stress(stepper.U)
+        stepper._stress(stepper.U, 0.0)
         stepper._sum_forces(stepper.U, stepper.U, 0.0)
         total = stepper.forces.internal.numpy() + stepper.forces.correction.numpy()
         exact = -np.einsum("aij,aj->ai", stepper.flux.fields.Q.numpy(), stepper.U.surface.numpy())

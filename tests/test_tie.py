@@ -166,7 +166,7 @@ def test_it_costs_less_than_a_tenth_of_the_step(dim, n):
             stepper.U.v.zero_()
             stepper.U.x.assign(X + u)
             stepper.U.F.assign(np.eye(dim) + gradient)
-            stepper._stress(stepper.U)
+            stepper._stress(stepper.U, 0.0)
             stepper._sum_forces(stepper.U, stepper.U, 0.0)
             forces = stepper.forces
             acceleration = (forces.internal.numpy() + forces.tie.numpy()) / simulation.particles.mass.numpy()[:, None]

@@ -27,6 +27,8 @@ def failure(simulation: Any) -> UnstableError | None:
         x, v, F = simulation.x[particle], simulation.v[particle], simulation.F[particle]
         if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
             what = f"det F = {np.linalg.det(F):.4g}, must be positive"
+            if np.linalg.det(F) > 0.0:
+                what = f"no state that its material allows, {_history(simulation, particle)}, F = {F.tolist()}"
         else:
             what = f"non-finite values, v = {v}, F = {F.tolist()}"
     elif dt < STALLED * simulation.clock.longest_dt:
@@ -92,6 +94,11 @@ def where(simulation: Any, particle: int, x: np.ndarray) -> str:
 def place_of(body: str, x: np.ndarray) -> str:
     """Words on a body and a place x [m], (dim,)."""
     return f"of body {body!r} at x = {np.array2string(x, precision=6)} m"
+
+
+def _history(simulation: Any, particle: int) -> str:
+    names = {variable.name for _, part in simulation.stepper.remembering for variable in part.law.history}
+    return ", ".join(f"{name} = {simulation.history(name)[particle].tolist()}" for name in sorted(names))
 
 
 def _fastest(simulation: Any) -> int:

@@ -57,6 +57,7 @@ FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
     "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
     "tie": Field("mat", "Pa", "share of Q that ties F to the positions (M16); empty where nothing is tied"),
+    "dissipated": Field("real", "J", "energy that the law dissipated in the last step; empty where none does"),
     "drag": Field(
         "mat", "Pa", "share of Q that is the dissipation's (M9); empty where its forces are all there is of it"
     ),

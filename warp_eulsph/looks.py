@@ -82,6 +82,24 @@ class Looks:
         """Stored energy per initial volume Ψ [J/m³], (n,)."""
         return self.order.by_number(self.stepper.ledger.stored_by_particle(self.stepper.U) / self.particles.V0.numpy())
 
+    def history(self, name: str) -> np.ndarray:
+        """What materials remember under this name, (n,), or (n, 3, 3) of a tensor; NaN in bodies whose law does not.
+
+        Raises:
+            ValueError: no material remembers anything of that name.
+        """
+        bodies = self.stepper.remembering
+        found = [part.law.by_name(part.history.numpy()).get(name) for _, part in bodies]
+        shapes = [values.shape[1:] for values in found if values is not None]
+        if not shapes:
+            known = sorted({variable.name for _, part in bodies for variable in part.law.history})
+            raise ValueError(f"history must be one of {known}, which the materials remember, got {name!r}")
+        out = np.full((len(self.particles.mass), *shapes[0]), np.nan, dtype=self.space.numpy)
+        for (span, _), values in zip(bodies, found, strict=True):
+            if values is not None:
+                out[span.start : span.stop] = values
+        return self.order.by_number(out)
+
     @property
     def force(self) -> np.ndarray:
         """Forces on the particles in the last step, all together [N], (n, dim): N/m in 2-D, N/m² in 1-D.

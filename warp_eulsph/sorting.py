@@ -172,10 +172,8 @@ class Sorting:
         own = {id(array) for part in self._parts for array in part.evolving().values()}
         spans: dict[int, range] = {}
         for medium in stepper.media:
-            first = medium.span.start
             spans |= {id(array): medium.span for array in medium.evolving().values()}
-            for history, body in zip(medium.flux.histories, medium.flux.bodies, strict=True):
-                spans[id(history)] = range(first + body.start, first + body.stop)
+        spans |= {id(part.history): span for span, part in stepper.remembering}
         for array in stepper.evolving().values():
             span = spans.get(id(array), range(stepper.n))
             if len(array) == len(span) and id(array) not in own:  # theirs go by number

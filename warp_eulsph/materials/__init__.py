@@ -1,7 +1,9 @@
 """Materials, one law per file."""
 
 from .bar import Bar
-from .base import Law, Material
+from .base import Law, Material, Variable
+from .hardening import Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
+from .j2 import J2
 from .linear_elastic import LinearElastic
 from .mooney_rivlin import MooneyRivlin
 from .nearly_incompressible import NearlyIncompressible
@@ -11,14 +13,21 @@ from .saint_venant_kirchhoff import SaintVenantKirchhoff
 from .tait_liquid import TaitLiquid
 
 __all__ = [
+    "J2",
     "Bar",
+    "Hardening",
+    "JohnsonCook",
     "Law",
     "LinearElastic",
+    "LinearHardening",
     "Material",
     "MooneyRivlin",
     "NearlyIncompressible",
     "NeoHookean",
     "NeoHookeanLog",
     "SaintVenantKirchhoff",
+    "Tabulated",
     "TaitLiquid",
+    "Variable",
+    "Voce",
 ]

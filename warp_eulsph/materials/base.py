@@ -6,26 +6,65 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 import warp as wp
 
 from ..linalg import reciprocal_cube_root
 from ..space import Space
+
+# Where the components of a symmetric tensor stand among xx, yy, zz, xy, xz, yz.
+SYMMETRIC = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
+
+
+class Variable(NamedTuple):
+    """A history variable: what a law remembers of each particle, under this name in snapshots, probes and checkpoints.
+
+    Attributes:
+        name: letters, digits and underscores.
+        unit: SI unit.
+        meaning: in a few words.
+        start: its value at the start: a number, or six of a symmetric tensor, xx, yy, zz, xy, xz, yz in any dimension.
+        least: bound from below, which a remap (M15) must not pass; None has none.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    start: float | tuple[float, float, float, float, float, float] = 0.0
+    least: float | None = None
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The starting values, 1 or 6."""
+        return self.start if isinstance(self.start, tuple) else (self.start,)
 
 
 class Law(NamedTuple):
     """The point functions of a material in one space, all ``wp.func``.
 
     Attributes:
-        Constants: ``wp.struct`` of scalars that the functions take.
+        Constants: ``wp.struct`` of numbers, and vectors of them, that the functions take.
         stress: (F, constants) -> P, first Piola–Kirchhoff stress [Pa].
         energy: (F, constants) -> Ψ, stored energy per initial volume [J/m^d].
         wave_moduli: (F, constants) -> (M, μ) [Pa]. M bounds ρ0 c² of all waves in all directions, c in the current
             configuration; μ bounds ρ0 c² of the shear waves along the principal directions. Both are exact at F = I.
-        carry: what the material keeps of an F after a full step; None keeps all of it. (F, constants) -> F, or with a
-            history (F, history, constants) -> (F, history). A fluid keeps det(F)^(1/d) I, because its F would grow
-            without bound in shear; a plastic solid keeps its elastic part. Carrying twice must equal carrying once,
-            because a step of length zero carries too.
-        history: reals per particle that ``carry`` updates, zero at the start (a hardening variable, a largest stretch).
+        update: (F, constants) -> F, what a full step leaves of F; None leaves all. A liquid keeps det(F)^(1/d) I,
+            because its F would grow without bound in shear. Twice must equal once, because a step of length zero
+            updates too.
+        rebase: see below.
+        history: the variables that the law remembers, in this order one row of reals per particle; the same in every
+            dimension.
+
+    A law with a history has the long form, in which l = Ḟ F⁻¹ [1/s] is the velocity gradient and h the row:
+
+        stress: (F, l, h, Δt, constants) -> P, where F is Δt [s] ahead of h: that of the half step. An inelastic law
+            returns to its yield surface here too, and the new history is forgotten. Δt = 0: F and h belong together.
+        energy: (F, h, constants) -> Ψ. wave_moduli: (F, h, constants) -> (M, μ).
+        update: (F, l, h, Δt, constants) -> (F, h, energy dissipated per initial volume [J/m^d]) after each full step,
+            Δt > 0. Where it finds no state, it returns a history that is not finite; the run stops there. Between two
+            refreshes F − F_k is the motion since, so only a law that needs ``Always()`` may write F here.
+        rebase: (F, h, constants) -> (F, h) at each refresh, of bodies that it reads anew: a plastic solid starts from
+            its elastic F. It must keep det F, stress and energy. None keeps all.
 
     The moduli are second derivatives of Ψ along F → (I + ε m⊗n) F, n the direction of the wave and m its
     polarisation: ρ0 c² m = Q(n) m with m·Q m = d²Ψ/dε² at ε = 0.
@@ -35,8 +74,64 @@ class Law(NamedTuple):
     stress: Any
     energy: Any
     wave_moduli: Any
-    carry: Any = None
-    history: int = 0
+    update: Any = None
+    rebase: Any = None
+    history: tuple[Variable, ...] = ()
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """The row of the history at the start."""
+        return tuple(value for variable in self.history for value in variable.values)
+
+    def columns(self, name: str) -> slice:
+        """Where the variable of this name stands in the row.
+
+        Raises:
+            KeyError: there is none.
+        """
+        first = 0
+        for variable in self.history:
+            size = len(variable.values)
+            if variable.name == name:
+                return slice(first, first + size)
+            first += size
+        raise KeyError(name)
+
+    def by_name(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Rows (n, k) of the history as its variables, (n,) or (n, 3, 3) each."""
+        found = {}
+        for variable in self.history:
+            values = rows[:, self.columns(variable.name)]
+            found[variable.name] = values[:, SYMMETRIC] if values.shape[1] > 1 else values[:, 0]
+        return found
+
+
+@functools.cache
+def long_form(space: Space, law: Law) -> Law:
+    """``law`` with stress, energy and wave moduli in the long form; those of a law without a history ignore it."""
+    if law.history:
+        return law
+    real, mat, row, pair = space.real, space.mat, history_row(space, law), space.row(2)
+    Constants, stress_of, energy_of, moduli_of = law.Constants, law.stress, law.energy, law.wave_moduli
+
+    @wp.func
+    def stress(F: mat, rate: mat, h: row, dt: real, c: Constants) -> mat:
+        return stress_of(F, c)
+
+    @wp.func
+    def energy(F: mat, h: row, c: Constants) -> real:
+        return energy_of(F, c)
+
+    @wp.func
+    def wave_moduli(F: mat, h: row, c: Constants) -> pair:
+        return moduli_of(F, c)
+
+    return law._replace(stress=stress, energy=energy, wave_moduli=wave_moduli)
+
+
+def history_row(space: Space, law: Law) -> Any:
+    """Warp type of a row of the law's history; of one real that nobody reads where there is none."""
+    return space.row(max(len(law.start), 1))
 
 
 @functools.cache
@@ -77,8 +172,10 @@ class Material(ABC):
 
     density: float
 
-    #: The carried F is not the whole deformation gradient: neighbours change for good, and so must the reference.
+    #: Neighbours change for good, so that the arrangement must be read anew from the positions.
     flows: ClassVar[bool] = False
+    #: F is counted from the last step, not from the start: only ``Always()`` will do for a reference.
+    forgets: ClassVar[bool] = False
     #: P is linear in F − I: for small strains and rotations only, because a rotation then causes stress.
     linear: ClassVar[bool] = False
 
@@ -86,12 +183,19 @@ class Material(ABC):
         positive("density", self.density, "kg/m^3")
 
     @abstractmethod
-    def constants(self) -> dict[str, float]:
+    def constants(self) -> dict[str, Any]:
         """Values of the fields of ``Law.Constants``."""
 
     @abstractmethod
     def law(self, space: Space) -> Law:
         """Point functions in this space, cached: the same objects for the same space."""
+
+    def filled_constants(self, law: Law) -> Any:
+        """``Law.Constants`` of this law with the values of ``constants``."""
+        filled = law.Constants()
+        for name, value in self.constants().items():
+            setattr(filled, name, value)
+        return filled
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,6 +25,7 @@ class TaitLiquid(Material):
     sound_speed: float
     gamma: float = 7.0
     flows: ClassVar[bool] = True
+    forgets: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,7 +66,7 @@ def _law(space: Space) -> Law:
         return pair(c.B * c.gamma * wp.pow(determinant(F), real(1.0) - c.gamma), real(0.0))
 
     @wp.func
-    def carry(F: mat, c: Constants) -> mat:
+    def update(F: mat, c: Constants) -> mat:
         return wp.identity(n=wp.static(dim), dtype=real) * wp.pow(determinant(F), real(root))
 
-    return Law(Constants, stress, energy, wave_moduli, carry)
+    return Law(Constants, stress, energy, wave_moduli, update)

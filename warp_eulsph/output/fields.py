@@ -7,8 +7,9 @@ import numpy as np
 import warp as wp
 
 from ..fields import PARTICLES, STATE
+from ..materials import Variable
 from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
-from .recorded import Recorded, solids, transport
+from .recorded import Recorded, RecordedSolids, solids, transport
 from .stress import stress_array
 from .tensors import first_piola
 
@@ -122,15 +123,26 @@ TRANSPORT_FIELDS = {
 KNOWN = {**FIELDS, **TRANSPORT_FIELDS}
 #: Fields of solids that snapshots hold unless others are chosen.
 DEFAULT_FIELDS = tuple(name for name, field in FIELDS.items() if field.default)
+# Before the name of a history variable, as a source.
+HISTORY = "history of "
 
 
-def known_fields(names: Iterable[str] | None) -> tuple[str, ...] | None:
-    """The names, checked to be those of some field; None stays None, those by default.
+def source(name: str, simulation: Recorded) -> wp.array | np.ndarray:
+    """What fields are made of, by the name of a source: of ``SOURCES``, or a history variable."""
+    if solids(simulation) and name.startswith(HISTORY):
+        return simulation.history(name.removeprefix(HISTORY))
+    return SOURCES[name](simulation)
 
-    Raises:
-        ValueError: a name of no field.
-    """
-    return None if names is None else tuple(_chosen(names, KNOWN))
+
+def history_fields(simulation: RecordedSolids) -> dict[str, SnapshotField]:
+    """What the materials of a simulation remember, as fields; NaN in bodies whose law does not."""
+    variables = [variable for _, part in simulation.stepper.remembering for variable in part.law.history]
+    return {variable.name: _remembered(variable) for variable in variables}
+
+
+def _remembered(variable: Variable) -> SnapshotField:
+    shape = (3, 3) if isinstance(variable.start, tuple) else ()
+    return SnapshotField(lambda d: shape, variable.unit, variable.meaning, (HISTORY + variable.name,))
 
 
 def chosen_fields(names: Iterable[str] | None, simulation: Recorded) -> dict[str, SnapshotField]:
@@ -140,7 +152,8 @@ def chosen_fields(names: Iterable[str] | None, simulation: Recorded) -> dict[str
         ValueError: a name that is none of its fields.
     """
     if not transport(simulation):
-        return _chosen(names, FIELDS)
+        remembered = history_fields(simulation) if solids(simulation) else {}
+        return _chosen(names, {**FIELDS, **remembered})
     held = {name: field for name, field in TRANSPORT_FIELDS.items() if name != "exact" or simulation.exact is not None}
     return _chosen(names, held)
 

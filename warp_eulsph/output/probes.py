@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+import warp as wp
 
 from ..boundaries import Boundary
 from ..building import options_of
 from ..diagnostics import BodySums, SectionForce
 from ..schedule import EverySteps, Schedule
+from ..scheme.flux import Part
 from .recorded import RecordedSolids
 from .shape_functions import shape_functions
 from .stress import body_stress, stresses
@@ -48,6 +50,10 @@ class Probe(ABC):
                 f"{self.name!r}"
             )
 
+    def units_in(self, simulation: Any) -> dict[str, str]:
+        """SI units of what it measures of this simulation, by name."""
+        return dict(self.units)
+
     @abstractmethod
     def bind(self, simulation: RecordedSolids) -> Measure:
         """What measures; made before the first step, for a run that is resumed too.
@@ -59,7 +65,7 @@ class Probe(ABC):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PointProbe(Probe):
-    """Position, velocity, deformation gradient and Cauchy stress of a material point.
+    """Position, velocity, deformation gradient, Cauchy stress and history of a material point.
 
     Means over its neighbours with the simulation's weight, corrected to be exact for fields that are linear in the
     initial position (Shepard's and Bonet's corrections together); near a surface they extrapolate.
@@ -73,8 +79,12 @@ class PointProbe(Probe):
     body: str | None = None
     units: ClassVar[dict[str, str]] = {"x": "m", "v": "m/s", "F": "-", "cauchy_stress": "Pa"}
 
+    def units_in(self, simulation: Any) -> dict[str, str]:
+        law = _part(self, simulation, self.body).law
+        return {**self.units, **{variable.name: variable.unit for variable in law.history}}
+
     def bind(self, simulation: RecordedSolids) -> Measure:
-        body = _body(self, simulation, self.body)
+        body, part = _body(self, simulation, self.body), _part(self, simulation, self.body)
         point = np.asarray(self.X, dtype=float)
         if point.shape != (simulation.space.dim,) or not np.isfinite(point).all():
             raise ValueError(f"probe {self.name!r}: X must be ({simulation.space.dim},) finite numbers, got {self.X}")
@@ -85,9 +95,16 @@ class PointProbe(Probe):
 
         def measure() -> dict[str, Any]:
             x, v, F = (array[places].contiguous() for array in (U.x, U.v, U.F))
-            body_stress(space, body.material, range(len(near)), F, stress)
+            history = part.history
+            if part.law.history:
+                own = wp.array(
+                    places.numpy() - simulation.ranges[body.name].start, dtype=wp.int32, device=simulation.device
+                )
+                history = history[own].contiguous()
+            body_stress(space, body.material, range(len(near)), F, history, stress)
             fields = {"x": x, "v": v, "F": F, "cauchy_stress": stress}
-            return {name: np.tensordot(share, field.numpy().astype(float), 1) for name, field in fields.items()}
+            values = {name: field.numpy() for name, field in fields.items()} | part.law.by_name(history.numpy())
+            return {name: np.tensordot(share, value.astype(float), 1) for name, value in values.items()}
 
         return measure
 
@@ -178,6 +195,11 @@ def _body(probe: Probe, simulation: RecordedSolids, name: str | None) -> Any:
         if body.name == name:
             return body
     raise ValueError(f"probe {probe.name!r}: body must be one of {sorted(simulation.ranges)}, got {name!r}")
+
+
+def _part(probe: Probe, simulation: RecordedSolids, name: str | None) -> Part:
+    own = simulation.ranges[_body(probe, simulation, name).name]
+    return next(part for span, part in simulation.stepper.remembering if span == own)
 
 
 def _shape_functions(simulation: RecordedSolids, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:

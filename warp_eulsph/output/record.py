@@ -219,7 +219,7 @@ class _Recorder:
     ):
         self.home, self.simulation, self.recording, self.resumed = home, simulation, recording, resumed
         self.schedule = recording.schedule
-        tables = [Table(home.probes / probe.name, probe.units) for probe in recording.probes]
+        tables = [Table(home.probes / probe.name, probe.units_in(simulation)) for probe in recording.probes]
         self.probes = list(zip(recording.probes, measures, tables, strict=True))
         self.snapshots = snapshots
         self.snapshots.derive()

@@ -84,6 +84,9 @@ class RecordedSolids(Recorded, Protocol):
     def energy(self) -> dict[str, float]:
         """Energies [J], by account."""
 
+    def history(self, name: str) -> np.ndarray:
+        """What materials remember under this name, by number, (n,) or (n, 3, 3)."""
+
     def momentum(self) -> np.ndarray:
         """[kg m/s], (dim,)."""
 

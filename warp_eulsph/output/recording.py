@@ -11,7 +11,6 @@ from ..boundaries import Assembly, Region
 from ..checks import objects
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
 from ..settling import STEPS_BETWEEN_LOOKS, check_tolerance, residual
-from .fields import known_fields
 from .probes import Probe
 from .recorded import Recorded
 from .snapshot import checked_precision
@@ -54,7 +53,7 @@ class Recording:
     def __post_init__(self) -> None:
         if isinstance(self.fields, str):
             raise ValueError(f"fields must be a list of names, got {self.fields!r}; write [{self.fields!r}]")
-        object.__setattr__(self, "fields", known_fields(self.fields))
+        object.__setattr__(self, "fields", None if self.fields is None else tuple(self.fields))
         object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
         object.__setattr__(self, "probes", tuple(objects(self.probes, Probe, "probes", "BodyProbe(name='whole')")))
         names = [probe.name for probe in self.probes]

@@ -11,7 +11,6 @@ import numpy as np
 from .atomic import replace_file
 from .copies import Copies
 from .directory import RunDirectory
-from .fields import known_fields
 from .manifest import Manifest, entry_of
 from .recorded import Recorded
 from .snapshot import Frame, checked_precision, collect, encode
@@ -53,7 +52,8 @@ class SnapshotWriter:
         resume: bool = False,
     ):
         self.directory = Path(directory)
-        self.fields, self.dtype = known_fields(fields), checked_precision(dtype)
+        self.fields = None if fields is None else tuple(fields)
+        self.dtype = checked_precision(dtype)
         self.particles, self.manifest = particles, Manifest(self.directory)
         if particles is not None and self.fields is not None and "particle" not in self.fields:
             self.fields = (*self.fields, "particle")

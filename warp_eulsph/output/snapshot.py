@@ -15,7 +15,7 @@ import warp as wp
 from ..fields import STATE
 from .atomic import replace_file
 from .copies import Copies, Copy
-from .fields import SOURCES, SnapshotField, chosen_fields
+from .fields import SnapshotField, chosen_fields, source
 from .hdf5 import DIGEST, check_layout, digest_of_layout, member, names, opened, read, seal
 from .recorded import Recorded
 from .sealed import DamagedError
@@ -103,12 +103,12 @@ def collect(
     simulation.whole.check()
     fields, places = chosen_fields(names, simulation), simulation.order.places
     numbers = np.arange(len(places)) if particles is None else particles
-    needed = dict.fromkeys(["x", *(source for field in fields.values() for source in field.sources)])
+    needed = dict.fromkeys(["x", *(name for field in fields.values() for name in field.sources)])
     taken = Copies(simulation.device) if copies is None else copies
     sources = {}
     for name in needed:
-        source = SOURCES[name](simulation)
-        sources[name] = taken.take(source, places[numbers] if isinstance(source, wp.array) else numbers)
+        made = source(name, simulation)
+        sources[name] = taken.take(made, places[numbers] if isinstance(made, wp.array) else numbers)
     frame = Frame(simulation.t, simulation.steps, simulation.space.dim, fields, sources)
     if copies is None:
         frame.wait()

@@ -7,8 +7,9 @@ import numpy as np
 import warp as wp
 
 from ..execution import launch
+from ..linalg import det
 from ..materials import Law, Material
-from ..scheme.flux import stress_in_reference
+from ..materials.base import history_row, long_form
 from ..space import Space, matrix_type
 from .recorded import RecordedSolids
 
@@ -17,18 +18,29 @@ from .recorded import RecordedSolids
 def _make_cauchy(space: Space, full: Space, law: Law) -> Any:
     """Kernel: σ of F in the space of the simulation, by a law in ``full`` dimensions with missing stretches of one."""
     real, mat, Constants = space.real, space.mat, law.Constants
-    mat33, dim, full_dim = matrix_type(3, 3, space.real), space.dim, full.dim
-    Q_of = stress_in_reference(full, law)
+    mat33, dim, full_dim, full_mat = matrix_type(3, 3, space.real), space.dim, full.dim, full.mat
+    P_of, determinant = long_form(full, law).stress, det(full)
+    row, remembers = history_row(full, law), bool(law.history)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def cauchy(first: int, F: wp.array(dtype=mat), c: Constants, sigma: wp.array(dtype=mat33)):
+    def cauchy(
+        first: int,
+        begin: int,
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        c: Constants,
+        sigma: wp.array(dtype=mat33),
+    ):
         a = first + wp.tid()
         F_a = F[a]
         G = wp.identity(n=wp.static(full_dim), dtype=real)
         for j in range(wp.static(dim)):
             for k in range(wp.static(dim)):
                 G[j, k] = F_a[j, k]
-        stress = Q_of(G, G, c)
+        h = row()
+        if wp.static(remembers):
+            h = history[a - begin]
+        stress = P_of(G, full_mat(), h, real(0.0), c) @ wp.transpose(G) / determinant(G)
         out = mat33()
         for j in range(wp.static(full_dim)):
             for k in range(wp.static(full_dim)):
@@ -38,8 +50,11 @@ def _make_cauchy(space: Space, full: Space, law: Law) -> Any:
     return cauchy
 
 
-def body_stress(space: Space, material: Material, body: range, F: wp.array, sigma: wp.array) -> None:
-    """σ [Pa] of the deformation gradients ``F`` of one material's particles into ``sigma``, (n,) of 3 × 3."""
+def body_stress(space: Space, material: Material, body: range, F: wp.array, history: wp.array, sigma: wp.array) -> None:
+    """σ [Pa] of the deformation gradients ``F`` of one material's particles into ``sigma``, (n,) of 3 × 3.
+
+    ``history`` has the rows of the ``body``; what is viscous in the stress is left out, for nothing says how F moves.
+    """
     full = Space(3, space.real)
     try:
         law = material.law(full)
@@ -47,11 +62,8 @@ def body_stress(space: Space, material: Material, body: range, F: wp.array, sigm
         # A law of fewer dimensions only, a bar: uniaxial stress, the components it does not give are zero.
         full = Space(space.dim, space.real)
         law = material.law(full)
-    constants = law.Constants()
-    for name, value in material.constants().items():
-        setattr(constants, name, value)
     kernel = _make_cauchy(Space(space.dim, space.real), full, law)
-    launch(kernel, len(body), [F, constants, sigma], F.device, body.start)
+    launch(kernel, len(body), [body.start, F, history, material.filled_constants(law), sigma], F.device, body.start)
 
 
 def stresses(space: Space, n: int, device: Any) -> wp.array:
@@ -66,8 +78,8 @@ def stress_array(simulation: RecordedSolids) -> wp.array:
     """
     space, F = simulation.space, simulation.stepper.U.F
     sigma = stresses(space, len(F), simulation.device)
-    for body in simulation.bodies:
-        body_stress(space, body.material, simulation.ranges[body.name], F, sigma)
+    for body, (span, part) in zip(simulation.bodies, simulation.stepper.remembering, strict=True):
+        body_stress(space, body.material, span, F, part.history, sigma)
     return sigma
 
 

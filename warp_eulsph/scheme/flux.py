@@ -1,48 +1,69 @@
-"""The flux of momentum: stress in the reference, body by body (M1), and the wave speeds there."""
+"""The flux of momentum: stress in the reference, body by body (M1), the wave speeds there, and what laws remember."""
 
 import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 import warp as wp
 
-from ..atomics import raise_to
+from ..atomics import lower_to, raise_to
 from ..execution import Launcher
 from ..fields import allocate, clock_structure, structure
 from ..linalg import det, inverse, largest_shortening
 from ..materials import Law, Material
+from ..materials.base import history_row, long_form
 from ..space import Space
 from .policy import Always, Every, ReferencePolicy
 from .reference import Configuration, resolution
 
 
 @functools.cache
-def stress_in_reference(space: Space, law: Law) -> Any:
-    """``wp.func`` Q = P(F) F_kᵀ / J_k (M1); the Cauchy stress when F_k = F, P when F_k = I."""
-    mat, Constants = space.mat, law.Constants
-    stress, determinant = law.stress, det(space)
+def velocity_gradient(space: Space, fixed: bool) -> Any:
+    """``wp.func`` l = Ḟ F⁻¹ of particle a, whose deformation gradient is F, from ∇_k v."""
+    mat, Reference, invert = space.mat, structure(space, "Reference"), inverse(space)
 
     @wp.func
-    def stress_in_reference(F: mat, F_k: mat, c: Constants) -> mat:
-        return stress(F, c) @ wp.transpose(F_k) / determinant(F_k)
+    def velocity_gradient(a: int, F: mat, grad_v: mat, reference: Reference) -> mat:
+        if wp.static(fixed):
+            return grad_v @ invert(F)
+        return grad_v @ reference.F[a] @ invert(F)
 
-    return stress_in_reference
+    return velocity_gradient
 
 
 @functools.cache
 def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> Any:
-    mat = space.mat
-    Reference, Flux, Constants = structure(space, "Reference"), structure(space, "Flux"), law.Constants
-    P_of, Q_of = law.stress, stress_in_reference(space, law)
+    mat, real, determinant = space.mat, space.real, det(space)
+    Reference, Flux, Clock = structure(space, "Reference"), structure(space, "Flux"), clock_structure(space)
+    Constants, row, remembers = law.Constants, history_row(space, law), bool(law.history)
+    P_of, rate_of = long_form(space, law).stress, velocity_gradient(space, fixed)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def compute_flux(first: int, F: wp.array(dtype=mat), reference: Reference, c: Constants, flux: Flux):
+    def compute_flux(
+        first: int,
+        begin: int,
+        F: wp.array(dtype=mat),
+        grad_v: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        reference: Reference,
+        clock: Clock,
+        fraction: wp.float64,
+        c: Constants,
+        flux: Flux,
+    ):
         a = first + wp.tid()
-        Q = mat()
-        if wp.static(fixed):
-            Q = P_of(F[a], c)
-        else:
-            Q = Q_of(F[a], reference.F[a], c)
+        rate = mat()
+        h = row()
+        ahead = real(0.0)
+        if wp.static(remembers):
+            rate = rate_of(a, F[a], grad_v[a], reference)
+            h = history[a - begin]
+            ahead = real(fraction * clock.dt[0])
+        Q = P_of(F[a], rate, h, ahead, c)
+        if wp.static(not fixed):
+            F_k = reference.F[a]
+            Q = Q @ wp.transpose(F_k) / determinant(F_k)
         flux.Q[a] = Q
         if wp.static(dual):
             flux.Pi[a] = Q @ wp.transpose(reference.L[a])
@@ -60,14 +81,17 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
     real, mat = space.real, space.mat
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Clock, Constants, dim = clock_structure(space), law.Constants, float(space.dim)
-    invert, moduli, shortening_of = inverse(space), law.wave_moduli, largest_shortening(space)
+    row, remembers, moduli = history_row(space, law), bool(law.history), long_form(space, law).wave_moduli
+    invert, shortening_of = inverse(space), largest_shortening(space)
     raise_rate, resolution_of = raise_to(real), resolution(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
         first: int,
+        begin: int,
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
         particles: Particles,
         reference: Reference,
         c: Constants,
@@ -80,7 +104,10 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
         if wp.static(not fixed):
             G = G @ invert(reference.F[a])
         shortening = shortening_of(G)  # squared
-        M = moduli(F[a], c)
+        h = row()
+        if wp.static(remembers):
+            h = history[a - begin]
+        M = moduli(F[a], h, c)
         per_density = shortening * particles.V0[a] / particles.mass[a]
         speed = wp.sqrt(wp.max(M[0], real(0.0)) * per_density)
         shear_speed = wp.sqrt(wp.max(M[1], real(0.0)) * per_density)
@@ -106,11 +133,12 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
 @functools.cache
 def _make_moduli(space: Space, law: Law) -> Any:
     """Kernel of one thread: the wave moduli at F = I."""
-    real, dim, pair, Constants, moduli = space.real, space.dim, space.row(2), law.Constants, law.wave_moduli
+    real, dim, pair, Constants = space.real, space.dim, space.row(2), law.Constants
+    row, moduli = history_row(space, law), long_form(space, law).wave_moduli
 
     @wp.kernel(module="unique", enable_backward=False)
-    def moduli_at_rest(c: Constants, out: wp.array(dtype=pair)):
-        M = moduli(wp.identity(n=wp.static(dim), dtype=real), c)
+    def moduli_at_rest(start: wp.array(dtype=row), c: Constants, out: wp.array(dtype=pair)):
+        M = moduli(wp.identity(n=wp.static(dim), dtype=real), start[0], c)
         out[0] = pair(M[0], M[1])
 
     return moduli_at_rest
@@ -118,59 +146,119 @@ def _make_moduli(space: Space, law: Law) -> Any:
 
 @functools.cache
 def _make_energy(space: Space, law: Law) -> Any:
-    mat = space.mat
-    Particles, Constants, density = structure(space, "Particles"), law.Constants, law.energy
+    mat, row, remembers = space.mat, history_row(space, law), bool(law.history)
+    Particles, Constants, density = structure(space, "Particles"), law.Constants, long_form(space, law).energy
 
     @wp.kernel(module="unique", enable_backward=False)
-    def energy(first: int, F: wp.array(dtype=mat), particles: Particles, c: Constants, out: wp.array(dtype=wp.float64)):
+    def energy(
+        first: int,
+        begin: int,
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        particles: Particles,
+        c: Constants,
+        out: wp.array(dtype=wp.float64),
+    ):
         a = first + wp.tid()
-        out[a] = wp.float64(particles.V0[a] * density(F[a], c))
+        h = row()
+        if wp.static(remembers):
+            h = history[a - begin]
+        out[a] = wp.float64(particles.V0[a] * density(F[a], h, c))
 
     return energy
 
 
 @functools.cache
-def _make_carry(space: Space, law: Law) -> Any:
-    mat, Constants, kept = space.mat, law.Constants, law.carry
+def _make_forget(space: Space, law: Law) -> Any:
+    """Kernel: what a law without a history leaves of F after a full step."""
+    mat, Constants, kept = space.mat, law.Constants, law.update
 
     @wp.kernel(module="unique", enable_backward=False)
-    def carry(first: int, F: wp.array(dtype=mat), c: Constants):
+    def forget(first: int, F: wp.array(dtype=mat), c: Constants):
         a = first + wp.tid()
         F[a] = kept(F[a], c)
 
-    return carry
+    return forget
 
 
 @functools.cache
-def _make_carry_history(space: Space, law: Law) -> Any:
-    mat, row, Constants, kept = space.mat, space.row(law.history), law.Constants, law.carry
+def _make_update(space: Space, law: Law, fixed: bool) -> Any:
+    """Kernel: the history after a full step and the energy that it dissipated; a step of length zero changes nothing.
+
+    A particle whose history is not finite is bad: its law found no state.
+    """
+    real, mat, row, length = space.real, space.mat, history_row(space, law), len(law.start)
+    Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
+    Flux, Constants, updated = structure(space, "Flux"), law.Constants, law.update
+    rate_of = velocity_gradient(space, fixed)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def carry_history(first: int, begin: int, F: wp.array(dtype=mat), history: wp.array(dtype=row), c: Constants):
+    def update(
+        first: int,
+        begin: int,
+        F: wp.array(dtype=mat),
+        grad_v: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        particles: Particles,
+        reference: Reference,
+        clock: Clock,
+        c: Constants,
+        flux: Flux,
+    ):
         a = first + wp.tid()
-        F_a, history_a = kept(F[a], history[a - begin], c)
+        flux.dissipated[a] = real(0.0)
+        dt = real(clock.dt[0])
+        if dt > real(0.0):
+            rate = rate_of(a, F[a], grad_v[a], reference)
+            F_a, h, lost = updated(F[a], rate, history[a - begin], dt, c)
+            F[a] = F_a
+            history[a - begin] = h
+            flux.dissipated[a] = particles.V0[a] * lost
+            nothing = real(0.0)  # NaN as soon as a component is not finite
+            for i in range(wp.static(length)):
+                nothing += h[i] * real(0.0)
+            if nothing != real(0.0):
+                lower_to(clock.bad, a)
+
+    return update
+
+
+@functools.cache
+def _make_rebase(space: Space, law: Law) -> Any:
+    """Kernel: F and history as a new reference takes them."""
+    mat, row, Constants, rebased = space.mat, history_row(space, law), law.Constants, law.rebase
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def rebase(first: int, begin: int, F: wp.array(dtype=mat), history: wp.array(dtype=row), c: Constants):
+        a = first + wp.tid()
+        F_a, h = rebased(F[a], history[a - begin], c)
         F[a] = F_a
-        history[a - begin] = history_a
+        history[a - begin] = h
 
-    return carry_history
+    return rebase
 
 
-class _Part(NamedTuple):
+class Part(NamedTuple):
+    """One body: its first particle, how many it has, its law, and what the law's particles remember.
+
+    ``history`` has one row per particle; it is empty where the law remembers nothing.
+    """
+
     first: int
     size: int
     law: Law
     constants: Any
-    history: wp.array | None
+    history: wp.array
 
 
 def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> None:
     """Raise unless the reference moves every step where a material needs that.
 
     Raises:
-        ValueError: a material that flows and a policy other than Always().
+        ValueError: a material that forgets and a policy other than Always().
     """
     for material in materials:
-        if material.flows and policy not in (Always(), Every(1)):
+        if material.forgets and policy not in (Always(), Every(1)):
             raise ValueError(
                 f"reference must be Always() for {type(material).__name__}, whose F is not counted from the initial "
                 f"configuration, got {policy}"
@@ -178,36 +266,36 @@ def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> N
 
 
 class Flux:
-    """Stress, wave speeds and stored energy of all bodies; one launch per body and quantity.
+    """Stress, wave speeds, stored energy and histories of all bodies; one launch per body and quantity.
 
     Args:
         bodies: (material, number of particles) in the order of the particle arrays.
 
     Attributes:
+        parts: the bodies with their laws and histories.
         bodies: particle indices of each body.
-        histories: what the material of each body remembers, (particles of the body,) of ``Law.history`` reals, or None.
     """
 
     def __init__(self, space: Space, bodies: list[tuple[Material, int]], particles: Any, device: Any):
         self.space, self.particles, self.device = space, particles, device
         self._launch = Launcher(device)
-        self.parts: list[_Part] = []
+        self.parts: list[Part] = []
         first = 0
         for material, count in bodies:
             law = material.law(space)
-            constants = law.Constants()
-            for name, value in material.constants().items():
-                setattr(constants, name, value)
-            history = wp.zeros(count, dtype=space.row(law.history), device=device) if law.history else None
-            self.parts.append(_Part(first, count, law, constants, history))
+            history = wp.zeros(count if law.history else 0, dtype=history_row(space, law), device=device)
+            if law.history:
+                history.assign(np.broadcast_to(law.start, (count, len(law.start))))
+            self.parts.append(Part(first, count, law, material.filled_constants(law), history))
             first += count
-        self.fields = allocate(space, "Flux", first, device, empty=("Pi", "tie", "drag"))
+        remembers = any(part.law.history for part in self.parts)
+        empty = ("Pi", "tie", "drag") if remembers else ("Pi", "tie", "drag", "dissipated")
+        self.fields = allocate(space, "Flux", first, device, empty=empty)
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
-        self.histories = [part.history for part in self.parts]
 
     def evolving(self) -> dict[str, wp.array]:
-        """The histories of the materials that have one, by body; what a checkpoint must hold."""
-        return {f"Flux.history.{i}": history for i, history in enumerate(self.histories) if history is not None}
+        """The histories of the bodies that have one; what a checkpoint must hold."""
+        return {f"Flux.history.{i}": part.history for i, part in enumerate(self.parts) if part.law.history}
 
     def keep_dual(self) -> None:
         """Have ``compute`` write Π too, for forces that take it from the array (M5)."""
@@ -219,37 +307,51 @@ class Flux:
         found = []
         for part in self.parts:
             out = wp.zeros(1, dtype=self.space.row(2), device=self.device)
-            self._launch.once(_make_moduli(self.space, part.law), 1, [part.constants, out])
+            row = history_row(self.space, part.law)
+            start = wp.array([row(*part.law.start)], dtype=row, device=self.device)
+            arguments = [start, part.constants, out]
+            self._launch.once(_make_moduli(self.space, part.law), 1, arguments)
             found.append((float(out.numpy()[0, 0]), float(out.numpy()[0, 1])))
         return found
 
-    def compute(self, F: wp.array, configuration: Configuration) -> None:
-        """Q of the deformation gradients ``F`` (M1), and Π = Q Lᵀ (M5) if it is kept."""
+    def compute(
+        self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any, fraction: float = 0.0
+    ) -> None:
+        """Q of the deformation gradients ``F`` (M1), and Π = Q Lᵀ (M5) if it is kept.
+
+        F is ``fraction`` Δt ahead of the histories, moved by ``grad_v`` = ∇_k v.
+        """
         for part in self.parts:
-            arguments = [F, configuration.fields, part.constants, self.fields]
+            arguments = [part.first, F, grad_v, part.history, configuration.fields, clock, fraction]
             kernel = _make_flux(self.space, part.law, configuration.fixed, len(self.fields.Pi) > 0)
-            self._launch(kernel, part.size, arguments, part.first)
+            self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
         """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
         for part in self.parts:
-            arguments = [F, grad_v, self.particles, configuration.fields, part.constants, self.fields, clock]
+            arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields]
             kernel = _make_wave_speeds(self.space, part.law, configuration.fixed)
-            self._launch(kernel, part.size, arguments, part.first)
+            self._launch(kernel, part.size, [*arguments, part.constants, self.fields, clock], part.first)
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""
         for part in self.parts:
-            arguments = [F, self.particles, part.constants, out]
+            arguments = [part.first, F, part.history, self.particles, part.constants, out]
             self._launch(_make_energy(self.space, part.law), part.size, arguments, part.first)
 
-    def carry(self, F: wp.array) -> None:
-        """Reduce updated F to what each material carries, in place, and update the histories."""
+    def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
+        """After a full step that ``grad_v`` = ∇_k v made: what each law keeps of F, its history, what it dissipated."""
         for part in self.parts:
-            if part.law.carry is None:
-                continue
-            if part.history is None:
-                self._launch(_make_carry(self.space, part.law), part.size, [F, part.constants], part.first)
-            else:
+            if part.law.history and part.law.update is not None:
+                arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields, clock]
+                kernel = _make_update(self.space, part.law, configuration.fixed)
+                self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
+            elif part.law.update is not None:
+                self._launch(_make_forget(self.space, part.law), part.size, [F, part.constants], part.first)
+
+    def rebase(self, F: wp.array) -> None:
+        """Before a refresh: F and histories as the new reference takes them."""
+        for part in self.parts:
+            if part.law.rebase is not None:
                 arguments = [part.first, F, part.history, part.constants]
-                self._launch(_make_carry_history(self.space, part.law), part.size, arguments, part.first)
+                self._launch(_make_rebase(self.space, part.law), part.size, arguments, part.first)

@@ -95,7 +95,7 @@ class LaxStepper(Stepper):
         self._gradients(U)  # M4: ∇_k v, ∇_k F
         self._choose_dt(U)
         self._sense(U)  # d of M9
-        self._stress(U)  # M1: Q = P F_kᵀ / J_k
+        self._stress(U, 0.0)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, U, 0.0)  # M5, M9
         self._smooth(U, other)  # M6 or M7: S(U)
         self._note_smoothing(U, other)
@@ -103,7 +103,7 @@ class LaxStepper(Stepper):
         self._adopt(U, other)  # U is U^{n+1}, other is Uⁿ
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
-        self._carry(U)  # fluids keep J only
+        self._update(U)  # histories; liquids keep J only
         self._check(U)
         self.ledger.record(U, other, self._dv_by_medium)
         self.clock.tick()

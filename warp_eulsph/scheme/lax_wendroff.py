@@ -58,20 +58,20 @@ class LaxWendroffStepper(Stepper):
         self._gradients(U)  # M4: ∇_k v, ∇_k F
         self._choose_dt(U)
         self._sense(U)  # §5: d of vⁿ for both half steps, and the diffusion of Uⁿ
-        self._stress(U)  # M1: Q = P F_kᵀ / J_k
+        self._stress(U, 0.0)  # M1: Q = P F_kᵀ / J_k
         self._sum_forces(U, U, 0.0)  # M5, M9
         self._smooth(U, half)  # M6 or M7: S(U)
         self._predict(U, half, 0.5)  # M8: U^{n+½}
         self._impose(half, 0.5)
         self._velocity_gradient(half)  # M4
-        self._stress(half)  # M1
+        self._stress(half, 0.5)  # M1
         self._sum_forces(half, half, 0.5)  # M5, M9
         self._kick(U)  # M8: v^{n+1}
         self._drift(U, half, 1.0, U)  # M8: F^{n+1}, x^{n+1}
         self._limit(U)  # §5: U^{n+1} += d × diffusion
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
-        self._carry(U)  # fluids keep J only
+        self._update(U)  # histories; liquids keep J only
         self._check(U)
         self.ledger.record(U, half)
         self.clock.tick()

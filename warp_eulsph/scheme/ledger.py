@@ -13,31 +13,29 @@ from ..reduce import Sum, SumOfParticles
 from ..space import Space, matrix_type, vector_type
 from .exchanges import Exchanges
 from .medium import Medium
+from .powers import loads_power, lost, note, powers, work
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "damping", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
+ACCOUNTS = (
+    "external",
+    "constraint",
+    "damping",
+    "dissipation",
+    "material",
+    "correction",
+    "tie",
+    "limiter",
+    "stepping",
+    "shifting",
+)
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _loads_power(space: Space, damped: bool) -> Any:
-    """``wp.func`` (power of the loads on a particle at velocity v, power of what damps among them) [W]."""
-    Forces, precise = structure(space, "Forces"), vector_type(space.dim, wp.float64)
-
-    @wp.func
-    def loads_power(a: int, forces: Forces, v: precise) -> wp.vec2d:
-        loads, damping = precise(forces.external[a]), wp.float64(0.0)
-        if wp.static(damped):
-            loads -= precise(forces.damping[a])
-            damping = wp.dot(precise(forces.damping[a]), v)
-        return wp.vec2d(wp.dot(loads, v), damping)
-
-    return loads_power
-
-
-@functools.cache
-def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, damped: bool) -> Any:
+def _make_entries(
+    space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, damped: bool, inelastic: bool
+) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
@@ -45,7 +43,7 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
     The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
-    where it has a stress (M9).
+    where it has a stress (M9). The material's is what the laws say that they dissipated (``inelastic``).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -54,8 +52,9 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
         structure(space, "State"),
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
-    Flux = structure(space, "Flux")
-    precise, power_of = vector_type(space.dim, wp.float64), _loads_power(space, damped)
+    Flux, keep, work_of, lost_of = structure(space, "Flux"), note(space), work(space), lost(space, inelastic)
+    precise, pairs_power = vector_type(space.dim, wp.float64), powers(space, tied, dragged)
+    power_of = loads_power(space, damped)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -81,22 +80,16 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
         block = first + wp.tid()
         dt, total = clock.dt[0], _Entry()
         for a in range(block * each, wp.min((block + 1) * each, n)):
-            mass, v, internal = wide(particles.mass[a]), precise(state.v[a]), precise(forces.internal[a])
+            mass, v = wide(particles.mass[a]), precise(state.v[a])
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
-            strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate)
-            tie, limiter = wide(0.0), wide(0.0)
-            if wp.static(tied):
-                tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
-                strain_power -= tied_power
-                tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
-            dissipation = wp.dot(precise(forces.dissipation[a]), v_mean)
-            if wp.static(dragged):
-                dragged_power = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
-                strain_power -= dragged_power
-                dissipation -= dragged_power
-            stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
+            of_pairs = pairs_power(a, flux, strain_rate)
+            strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate) - of_pairs[0] - of_pairs[1]
+            lost = lost_of(a, flux)
+            stepping = W[a] - W_old[a] + lost - dt * strain_power
+            stepping += dt * work_of(forces.internal[a], v_mean - precise(half.v[a]))
+            limiter = wide(0.0)
             if wp.static(limited):
                 limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
                 stepping -= dW_limited[a]
@@ -107,17 +100,17 @@ def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smooth
                 dt * loads[0],
                 wp.dot(impulse, v_mean),
                 dt * loads[1],
-                dt * dissipation,
-                dt * wp.dot(precise(forces.correction[a]), v_mean),
-                tie,
+                dt * (work_of(forces.dissipation[a], v_mean) - of_pairs[1]),
+                -lost,
+                dt * work_of(forces.correction[a], v_mean),
+                dt * (work_of(forces.tie[a], v_mean) - of_pairs[0]),
                 limiter,
                 stepping,
                 wide(0.0),
             )
             if dt > wide(0.0):
                 forces.reaction[a] = vec(impulse / dt)
-            v_old[a] = state.v[a]
-            W_old[a] = W[a]
+            keep(a, state, W, v_old, W_old)
         out[block] = total
 
     return entries
@@ -128,7 +121,7 @@ def _make_shift_entry(space: Space) -> Any:
     """Kernel of ``SumOfParticles``: energy gained since the last entry, all of it by shifting (M15)."""
     vec, Particles, State, wide = space.vec, structure(space, "Particles"), structure(space, "State"), wp.float64
     precise = vector_type(space.dim, wp.float64)
-    last = len(ACCOUNTS) - 1
+    last, keep = len(ACCOUNTS) - 1, note(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift_entry(
@@ -148,8 +141,7 @@ def _make_shift_entry(space: Space) -> Any:
             v, before = precise(state.v[a]), precise(v_old[a])
             gain = wide(0.5) * wide(particles.mass[a]) * wp.dot(v - before, v + before) + W[a] - W_old[a]
             total += wide(particles.share[a]) * gain
-            v_old[a] = state.v[a]
-            W_old[a] = W[a]
+            keep(a, state, W, v_old, W_old)
         entry = _Entry()
         entry[last] = total
         out[block] = entry
@@ -289,8 +281,8 @@ class Ledger:
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
             arguments += [self.clock.fields, medium.forces]
             tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
-            limits, smooths = limiter is not None, smoothed is not None
-            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped)
+            limits, smooths, inelastic = limiter is not None, smoothed is not None, len(flux.fields.dissipated) > 0
+            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped, inelastic)
             self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:

@@ -138,6 +138,11 @@ class Medium:
         nothing_yet = self.forces.free_v
         self.configuration.defect(nothing_yet, self.of(state).surface)
 
+    def move(self, state: Any) -> None:
+        """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
+        self.flux.rebase(self.of(state).F)
+        self.configuration.move(self.of(state))
+
     def renew(self, state: Any) -> None:
         """Neighbours and corrections of the new reference (M3), and what the options add."""
         self.configuration.renew()
@@ -167,7 +172,7 @@ class Medium:
             self.velocity_gradient(state)
             self.configuration.gradient(self._rows(U.F), self.grad_F)
             psi = self.stabiliser.psi
-            self.shifter.apply(self.configuration.fields, psi, U, self.grad_v, self.grad_F, self.clock)
+            self.shifter.apply(self.configuration, psi, U, self.grad_v, self.grad_F, self.clock)
 
     # the lines of a step
 
@@ -193,9 +198,9 @@ class Medium:
         if self.limiter is not None:
             self.limiter.prepare(U, self.sensors[self.limiter.option.sensor].d)
 
-    def stress(self, state: Any) -> None:
-        """Q of F (M1)."""
-        self.flux.compute(self.of(state).F, self.configuration)
+    def stress(self, state: Any, fraction: float) -> None:
+        """Q of F (M1), which is ``fraction`` · Δt ahead of the histories."""
+        self.flux.compute(self.of(state).F, self.grad_v, self.configuration, self.clock, fraction)
 
     def sum_forces(self, state: Any, rates: Any) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
@@ -238,9 +243,9 @@ class Medium:
         if self.limiter is not None:
             self.limiter.apply(self.of(state), self.clock)
 
-    def carry(self, state: Any) -> None:
-        """Reduce F to what the materials carry: fluids keep J only."""
-        self.flux.carry(self.of(state).F)
+    def update(self, state: Any) -> None:
+        """Histories after a full step, and what materials keep of F: liquids J only."""
+        self.flux.update(self.of(state).F, self.grad_v, self.configuration, self.clock)
 
     def evolving(self) -> dict[str, wp.array]:
         """Every array of its own that a step reads before it writes it, by name."""

@@ -12,13 +12,16 @@ from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
-from .flux import Flux
+from .flux import Flux, Part
 from .health import WELL
 from .projection import Projection, pad
+from .reference import Configuration
 
 # Next to a surface, where |s_a| exceeds this share of a particle's face, nothing is shifted: there sums are one-sided,
 # and so is the defect that says where to go. In lattices that is so in the outermost three layers.
 NEAR_SURFACE = 0.05
+# Least value of what has none: a constant of a kernel must be finite, in float32 too.
+NO_BOUND = -1e38
 
 
 @dataclass(frozen=True)
@@ -47,17 +50,13 @@ class Shifting:
             )
 
     def build(self, space: Space, particles: Any, flux: Flux, held: np.ndarray, device: Any) -> "Shifter":
-        """Allocate; ``held`` are places of particles that stay, (k,).
-
-        Raises:
-            ValueError: a material with a history, which is not remapped.
-        """
+        """Allocate; ``held`` are places of particles that stay, (k,)."""
         return Shifter(self, space, particles, flux, held, device)
 
 
 @functools.cache
 def _make_shift(space: Space) -> Any:
-    """Kernel: x += G δ, F += ∇_k F · δ, impulse m ∇_k v · δ and its couple, δ = ½ rate ψ in the reference (M15).
+    """Kernel: x += G δ, F += ∇_k F · δ, impulse m ∇_k v · δ and its couple, δ = ½ rate ψ in the reference (M15), kept.
 
     Nothing moves once the target time is reached or the run has failed.
     """
@@ -84,6 +83,7 @@ def _make_shift(space: Space) -> Any:
         rate: real,
         bound: real,
         state: State,
+        out: wp.array(dtype=vec),
         impulse: wp.array(dtype=vec),
         couple: wp.array(dtype=wp.vec3d),
     ):
@@ -97,6 +97,7 @@ def _make_shift(space: Space) -> Any:
         running = clock.bad[0] == WELL and clock.t[0] < clock.target[0]
         if not running or free[a] == 0 or surface > real(NEAR_SURFACE) * wp.pow(reference.V[a], real(face)):
             delta = vec()
+        out[a] = delta
         mass = particles.mass[a]
         moved = state.F[a] @ (invert(reference.F[a]) @ delta)
         change = grad_F[a] @ delta
@@ -125,6 +126,47 @@ def _make_push(space: Space) -> Any:
     return push
 
 
+@functools.cache
+def _make_remap(space: Space, size: int, least: tuple[float, ...]) -> Any:
+    """Kernel: h += ∇_k h · δ, not below ``least``."""
+    real, vec, row, gradients = space.real, space.vec, space.row(size), space.row_gradient(size)
+    bound = row(*least)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def remap(
+        first: int,
+        begin: int,
+        moved: wp.array(dtype=vec),
+        gradient: wp.array(dtype=gradients),
+        history: wp.array(dtype=row),
+    ):
+        a = first + wp.tid()
+        # What did not move keeps its bits
+        if wp.dot(moved[a], moved[a]) > real(0.0):
+            history[a - begin] = wp.max(history[a - begin] + gradient[a] @ moved[a], bound)
+
+    return remap
+
+
+class Remap:
+    """M15 for the history of one body, whose rows are copied among those of all particles for their gradient."""
+
+    def __init__(self, space: Space, part: Part, n: int, device: Any):
+        self.part, self.space, self._launch = part, space, Launcher(device)
+        size = len(part.law.start)
+        self._rows = wp.zeros(n, dtype=space.row(size), device=device)
+        self._gradient = wp.zeros(n, dtype=space.row_gradient(size), device=device)
+        least = [v.least for v in part.law.history for _ in v.values]
+        self._kernel = _make_remap(space, size, tuple(NO_BOUND if bound is None else bound for bound in least))
+
+    def __call__(self, configuration: Configuration, moved: wp.array) -> None:
+        """Remap by what each particle ``moved`` in the reference [m], (n,) of vec."""
+        first, size = self.part.first, self.part.size
+        wp.copy(self._rows, self.part.history, dest_offset=first)
+        configuration.gradient(self._rows, self._gradient)
+        self._launch(self._kernel, size, [first, moved, self._gradient, self.part.history], first)
+
+
 class Shifter:
     """M15 at work on one set of particles."""
 
@@ -137,10 +179,10 @@ class Shifter:
         held: np.ndarray,
         device: Any,
     ):
-        if any(history is not None for history in flux.histories):
-            raise ValueError("shifting cannot remap the history of a material; use shifting=None")
         self.option, self.space, self.particles, self.device = option, space, particles, device
         n, self._launch = len(particles.mass), Launcher(device)
+        self._moved = wp.zeros(n, dtype=space.vec, device=device)
+        self._remaps = [Remap(space, part, n, device) for part in flux.parts if part.law.history]
         free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
@@ -151,11 +193,15 @@ class Shifter:
         """Which particles may be shifted: no step changes it, but particles change places."""
         return {"Shifter.free": self.free}
 
-    def apply(self, reference: Any, psi: wp.array, U: Any, grad_v: wp.array, grad_F: wp.array, clock: Any) -> None:
-        """Shift the particles of ``U``, whose gradients in ``reference`` are given; ψ [m] are its potentials (M13)."""
-        option, n = self.option, len(psi)
+    def apply(
+        self, configuration: Configuration, psi: wp.array, U: Any, grad_v: wp.array, grad_F: wp.array, clock: Any
+    ) -> None:
+        """Shift the particles of ``U``, whose gradients in the reference are given; ψ [m] are its potentials (M13)."""
+        option, n, reference = self.option, len(psi), configuration.fields
         arguments = [self.particles, reference, clock, psi, self.free, grad_v, grad_F, option.rate, option.bound, U]
-        arguments += [self.impulse, self.projection.couples]
+        arguments += [self._moved, self.impulse, self.projection.couples]
         self._launch(_make_shift(self.space), n, arguments)
+        for remap in self._remaps:
+            remap(configuration, self._moved)
         self.projection(U.x, self.impulse)
         self._launch(_make_push(self.space), n, [self.particles, self.impulse, U.v])

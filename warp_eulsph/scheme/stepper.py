@@ -65,9 +65,9 @@ class Stepper(World, ABC):
         for medium in self.media:
             medium.sense(state)
 
-    def _stress(self, state: Any) -> None:
+    def _stress(self, state: Any, fraction: float) -> None:
         for medium in self.media:
-            medium.stress(state)
+            medium.stress(state, fraction)
 
     def _sum_forces(self, state: Any, rates: Any, fraction: float) -> None:
         for medium in self.media:
@@ -110,9 +110,9 @@ class Stepper(World, ABC):
     def _release(self, state: Any) -> None:
         wp.copy(self.forces.free_v, state.v)
 
-    def _carry(self, state: Any) -> None:
+    def _update(self, state: Any) -> None:
         for medium in self.media:
-            medium.carry(state)
+            medium.update(state)
 
     def _check(self, state: Any) -> None:
         check(self._launch, self.space, state, self.clock.fields)

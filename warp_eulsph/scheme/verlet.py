@@ -77,7 +77,7 @@ class VerletStepper(Stepper):
         self._start_mean(U, half)  # vⁿ into v̄
         self._drift(U, U, 0.5, half)  # M14: F^{n+½}, x^{n+½}
         self._impose(half, 0.5)
-        self._stress(half)  # M1
+        self._stress(half, 0.5)  # M1
         self._sum_forces(half, U, 0.5)  # M5 of F^{n+½}, M9 of vⁿ
         self._kick(U)  # M14: v^{n+1}
         self._finish_mean(U, half)  # v̄ = ½(vⁿ + v^{n+1})
@@ -87,7 +87,7 @@ class VerletStepper(Stepper):
         self._limit(U)  # §5: U^{n+1} += d × diffusion
         self._release(U)  # the free velocity, for the reactions
         self._impose(U, 1.0)
-        self._carry(U)  # fluids keep J only
+        self._update(U)  # histories; liquids keep J only
         self._check(U)
         self.ledger.record(U, half)
         self.clock.tick()

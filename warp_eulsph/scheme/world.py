@@ -14,7 +14,7 @@ from ..interactions import BoundInteraction
 from ..operators.neighbours import NeighbourLists
 from ..space import Space
 from .exchanges import Exchange, Exchanges
-from .flux import Flux
+from .flux import Flux, Part
 from .ledger import Ledger
 from .medium import Medium, MediumParts
 from .reference import Configuration
@@ -140,7 +140,7 @@ class World:
         """First part of a refresh, launches only: the reference becomes U, shifted (M15); neighbours are counted."""
         self._shift(self.U, due)
         for k in due:
-            self.media[k].configuration.move(self.media[k].of(self.U))
+            self.media[k].move(self.U)
 
     def _renew(self, due: Sequence[int]) -> None:
         """Last part of a refresh, launches only, when the lists have room: neighbours, corrections, balance."""
@@ -175,6 +175,16 @@ class World:
         for own, part in parts:
             listed.append({f"{own}.{name}": array for name, array in part.evolving().items()})
         return {name: array for held in listed for name, array in held.items()}
+
+    @property
+    def remembering(self) -> list[tuple[range, Part]]:
+        """Places of each body's particles, with its law and what they remember."""
+        found = []
+        for medium in self.media:
+            for part in medium.flux.parts:
+                first = medium.span.start + part.first
+                found.append((range(first, first + part.size), part))
+        return found
 
     # of the only medium, where there is one
 

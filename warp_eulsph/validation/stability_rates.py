@@ -90,7 +90,7 @@ def _accelerate(simulation: Simulation, v: wp.array) -> np.ndarray:
         F = wp.array(
             simulation.F + sign * DIFFERENCE * grad_v @ simulation.F, dtype=simulation.space.mat, device=v.device
         )
-        stepper.flux.compute(F, configuration)
+        stepper.flux.compute(F, stepper.grad_v, configuration, simulation.clock.fields)
         configuration.divergence(stepper.flux.fields.Pi, out)
         force += sign / (2.0 * DIFFERENCE) * out.numpy()
     return force

@@ -176,7 +176,7 @@ class Step:
         self.speed = float(flux.fields.speed.numpy().max())
         self.dt = point.cfl / float(simulation.clock.fields.rate.numpy()[0])
         simulation.clock.option = TimeStep(fixed=self.dt)
-        flux.compute(stepper.U.F, configuration)
+        flux.compute(stepper.U.F, stepper.grad_v, configuration, simulation.clock.fields)
         self.stress = flux.fields.Q.numpy()[0].copy()
         self.modulus = simulation.particles.mass.numpy()[0] / configuration.fields.V.numpy()[0] * self.speed**2
 

@@ -1,0 +1,81 @@
+"""What the ledger asks of a particle in a step: work and power in float64, as ``wp.func``."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..fields import structure
+from ..space import Space, matrix_type, vector_type
+
+
+@functools.cache
+def loads_power(space: Space, damped: bool) -> Any:
+    """``wp.func`` (power of the loads on a particle at velocity v, power of what damps among them) [W]."""
+    Forces, precise = structure(space, "Forces"), vector_type(space.dim, wp.float64)
+
+    @wp.func
+    def loads_power(a: int, forces: Forces, v: precise) -> wp.vec2d:
+        loads, damping = precise(forces.external[a]), wp.float64(0.0)
+        if wp.static(damped):
+            loads -= precise(forces.damping[a])
+            damping = wp.dot(precise(forces.damping[a]), v)
+        return wp.vec2d(wp.dot(loads, v), damping)
+
+    return loads_power
+
+
+@functools.cache
+def note(space: Space) -> Any:
+    """``wp.func``: keep the end of a step as the start of the next."""
+    vec, State, wide = space.vec, structure(space, "State"), wp.float64
+
+    @wp.func
+    def note(a: int, state: State, W: wp.array(dtype=wide), v_old: wp.array(dtype=vec), W_old: wp.array(dtype=wide)):
+        v_old[a] = state.v[a]
+        W_old[a] = W[a]
+
+    return note
+
+
+@functools.cache
+def lost(space: Space, inelastic: bool) -> Any:
+    """``wp.func``: energy that the law of a particle dissipated in the step, 0 where none does."""
+    Flux = structure(space, "Flux")
+
+    @wp.func
+    def lost(a: int, flux: Flux) -> wp.float64:
+        if wp.static(inelastic):
+            return wp.float64(flux.dissipated[a])
+        return wp.float64(0.0)
+
+    return lost
+
+
+@functools.cache
+def powers(space: Space, tied: bool, dragged: bool) -> Any:
+    """``wp.func``: power [W] of the stresses in Q of a particle that are the tie's and the dissipation's."""
+    Flux, precise_mat = structure(space, "Flux"), matrix_type(space.dim, space.dim, wp.float64)
+
+    @wp.func
+    def powers(a: int, flux: Flux, strain_rate: precise_mat) -> wp.vec2d:
+        found = wp.vec2d()
+        if wp.static(tied):
+            found[0] = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
+        if wp.static(dragged):
+            found[1] = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
+        return found
+
+    return powers
+
+
+@functools.cache
+def work(space: Space) -> Any:
+    """``wp.func``: force · velocity in float64."""
+    vec, precise = space.vec, vector_type(space.dim, wp.float64)
+
+    @wp.func
+    def work(force: vec, v: precise) -> wp.float64:
+        return wp.dot(precise(force), v)
+
+    return work
