@@ -1,5 +1,6 @@
 """The documentation's site: ``python -m sphinx -W docs build/docs``."""
 
+import re
 from importlib import metadata
 
 project, author = "warp_eulsph", "the warp_eulsph authors"
@@ -40,7 +41,7 @@ copyright = "the warp_eulsph authors, Apache-2.0"
 
 def _keep_bars(app, what, name, obj, options, lines):
     """|v| is a length here, and would be a substitution in reStructuredText."""
-    lines[:] = [line if "``" in line else line.replace("|", r"\|") for line in lines]
+    lines[:] = [re.sub(r"(``.*?``)|\|", lambda found: found[1] or r"\|", line) for line in lines]
 
 
 def setup(app):

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 import warp_eulsph as es
-from warp_eulsph.output import Figure, SnapshotWriter, table
+from warp_eulsph.output import SnapshotWriter
+from warp_eulsph.validation import Figure, table
 from warp_eulsph.validation.cases.bar import errors, measure
 
 LENGTH = 0.1333  # m

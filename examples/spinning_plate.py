@@ -14,7 +14,8 @@ import numpy as np
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
+from warp_eulsph.output import SnapshotWriter, read_snapshot
+from warp_eulsph.validation import Figure, table
 from warp_eulsph.validation.cases.spinning_plate import SERIES, measure
 from warp_eulsph.validation.history import History, at, series
 from warp_eulsph.validation.solids import FORMS

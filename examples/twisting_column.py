@@ -15,7 +15,8 @@ import numpy as np
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-from warp_eulsph.output import Figure, SnapshotWriter, read_snapshot, table
+from warp_eulsph.output import SnapshotWriter, read_snapshot
+from warp_eulsph.validation import Figure, table
 from warp_eulsph.validation.cases.twisting_column import END_TIME, measure, reference_history
 from warp_eulsph.validation.history import History
 from warp_eulsph.validation.solids import FORMS

@@ -5,12 +5,14 @@ import os
 import random
 import signal
 import time
+from pathlib import Path
 
 import numpy as np
 from bodies import lattice
 
 import warp_eulsph as es
-from warp_eulsph.output import BodyProbe, PointProbe, ReactionProbe, Recording, SectionProbe, record
+from warp_eulsph.cases import read_case
+from warp_eulsph.output import BodyProbe, PointProbe, ReactionProbe, Recording, Run, SectionProbe, record
 from warp_eulsph.output.checkpoint import decode
 from warp_eulsph.output.tables import read_table
 from warp_eulsph.schedule import EverySteps, EveryTime
@@ -101,3 +103,13 @@ def killed_until_done(begin, kills, rng=None, after=lambda: None):
             assert os.WEXITSTATUS(status) == 0, "the resumed run failed"
             return killed
         killed += 1
+
+
+def short_run(dim, directory):
+    """Three tenths of an example in 1-D, 2-D or 3-D, coarse: a run of four frames."""
+    name = {1: "bar", 2: "spinning_plate", 3: "twisting_column"}[dim]
+    case = read_case(Path(__file__).parents[1] / "examples" / "cases" / f"{name}.toml", ["parameters.n=6"])
+    case = case.model_copy(update={"output": case.output.model_copy(update={"every": 0.1 * case.until})})
+    simulation = case.build()
+    record(simulation, directory, 0.3 * case.until, case.recording(simulation))
+    return Run(directory)

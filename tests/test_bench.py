@@ -2,12 +2,15 @@
 
 import dataclasses
 import json
+import re
+from pathlib import Path
 
+import numpy as np
 import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.bench import command, mixing, snapshot_cost
+from warp_eulsph.bench import command, mixing, release, snapshot_cost
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
 from warp_eulsph.bench.phases import PHASES
@@ -43,6 +46,34 @@ def test_names_of_cases_differ_and_cover_modes_dimensions_and_precisions():
     assert {(case.dim, case.dtype, case.mode) for case in CASES} == {
         (dim, dtype, mode) for dim in (1, 2, 3) for dtype in ("float32", "float64") for mode in MODES
     }
+
+
+FIGURES = sorted((Path(__file__).parents[1] / "bench").glob("*.json"))
+
+
+@pytest.mark.parametrize("path", FIGURES, ids=lambda path: path.stem)
+def test_figures_of_releases_can_be_read(path):
+    """Of a release that CHANGELOG.md knows, all cases of it, with the machine and how quiet it was."""
+    figures = json.loads(path.read_text(encoding="utf-8"))
+    assert figures["version"] == path.stem
+    changes = (path.parents[1] / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"## {path.stem}" in changes and np.datetime64(figures["date"]) >= np.datetime64("2026-01-01")
+    assert figures["machine"]["name"] and figures["machine"]["cores"] >= 1 and figures["versions"]["warp-lang"]
+    assert len({result["case"] for result in figures["results"]}) == len(figures["results"]) >= 18
+    for result in figures["results"]:
+        assert set(result) >= KEYS and result["particle_steps_per_second"] > 0.0 and 0.0 < result["roof_fraction"] < 1.0
+
+
+def test_there_are_figures_of_this_release():
+    version = re.search(r'^version = "(.*)"', (Path(__file__).parents[1] / "pyproject.toml").read_text(), re.MULTILINE)
+    assert version[1] in {path.stem for path in FIGURES}
+
+
+def test_figures_of_a_release_are_written_with_the_machine(quick, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(release, "CASES", tuple(case for case in command.CASES))
+    figures = json.loads(release.main(["-o", str(tmp_path)]).read_text())
+    assert [result["mode"] for result in figures["results"]] == list(MODES)
+    assert figures["machine"]["cores"] == execution.cores()
 
 
 def test_json_has_the_keys_and_plausible_values(quick, capsys):

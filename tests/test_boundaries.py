@@ -266,7 +266,7 @@ def test_quarter_with_walls_equals_the_full_problem(reference, scheme):
     full = es.Body(x=x, volume=DX**2, material=COMPRESSIBLE, velocity=velocity(x))
     x = lattice(6, 6)
     quarter = es.Body(x=x, volume=DX**2, material=COMPRESSIBLE, velocity=velocity(x))
-    depth = 2 * 2.0 * 1.3 * DX
+    depth = 3 * 2.0 * 1.3 * DX
     ghosted, left = mirror(quarter, point=(0, 0), normal=(-1, 0), depth=depth)
     ghosted, bottom = mirror(ghosted, point=(0, 0), normal=(0, -2), depth=depth, image=Wall())
     options = {"reference": reference, "scheme": scheme, "time_step": es.TimeStep(fixed=1e-4)}
@@ -289,7 +289,7 @@ def test_half_of_a_block_equals_the_whole_behind_an_oblique_wall():
     half = x[:, 0] > 0
     whole = es.Body(x=x @ turn.T, volume=DX**3, material=COMPRESSIBLE, velocity=v @ turn.T)
     part = es.Body(x=x[half] @ turn.T, volume=DX**3, material=COMPRESSIBLE, velocity=v[half] @ turn.T)
-    part, wall = mirror(part, point=(0, 0, 0), normal=-turn[:, 0], depth=2 * 2.0 * 1.3 * DX)
+    part, wall = mirror(part, point=(0, 0, 0), normal=-turn[:, 0], depth=3 * 2.0 * 1.3 * DX)
     step = es.TimeStep(fixed=1e-4)
     full = es.Simulation(whole, reference=es.Never(), time_step=step)
     walled = es.Simulation(part, boundaries=[wall], reference=es.Never(), time_step=step)
@@ -320,8 +320,8 @@ def test_bar_is_nodally_exact_at_courant_number_two():
     x = (np.arange(40) + 0.5)[:, None] * dx
     velocity = np.where(x > 0.75 * LENGTH, SPEED, 0.0)
     body = es.Body(x=x, volume=dx, material=Bar(density=DENSITY, young=YOUNG), velocity=velocity)
-    body, fixed_end = mirror(body, point=[0.0], normal=[-1.0], depth=4 * dx)
-    body, free_end = mirror(body, point=[LENGTH], normal=[1.0], depth=4 * dx, image=Antisymmetry())
+    body, fixed_end = mirror(body, point=[0.0], normal=[-1.0], depth=6 * dx)
+    body, free_end = mirror(body, point=[LENGTH], normal=[1.0], depth=6 * dx, image=Antisymmetry())
     assert len(body.x) == 48
     simulation = es.Simulation(
         body,

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import warp as wp
-from loads import RUBBER, bar, beam, clamped, inside
+from bodies import COMPRESSIBLE
+from loads import bar, beam, clamped, inside
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box, nodes
@@ -41,7 +42,7 @@ def test_it_does_no_work_and_bears_the_load(dim, reference):
     """In an oblique direction; the impulse of clamp and weight is the momentum."""
     turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(dim, dim)))
     x, volume = box((0,) * dim, (1.0, 0.5, 0.5)[:dim], 1 / 8, jitter=0.05)
-    body = es.Body(x=x @ turn.T, volume=volume, material=RUBBER, velocity=(x * (3.0, -20.0, 10.0)[:dim]) @ turn.T)
+    body = es.Body(x=x @ turn.T, volume=volume, material=COMPRESSIBLE, velocity=(x * (3.0, -20.0, 10.0)[:dim]) @ turn.T)
     clamp = es.Clamped((0.0,) * dim, -turn[:, 0])
     simulation = es.Simulation(body, boundaries=[clamp], reference=reference)
     impulse, start = np.zeros(dim), simulation.momentum()
@@ -74,14 +75,14 @@ def test_the_plane_may_lie_off_the_cells(offset):
     x, volume = box((0, 0), (1, 1), 0.1)
     plane = -offset * 0.1 + 0.05
     slope = np.array([3.0, -2.0])
-    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=(x[:, :1] - plane) * slope)
+    body = es.Body(x=x, volume=volume, material=COMPRESSIBLE, velocity=(x[:, :1] - plane) * slope)
     simulation = es.Simulation(body, boundaries=[es.Clamped((plane, 0.0), (-1.0, 0.0))])
     np.testing.assert_allclose(simulation.v, body.velocity, atol=1e-13)
 
 
 def test_it_holds_a_patch_and_particles_on_the_plane():
     x, volume, surface = nodes((0, 0), (1, 1), 0.1)
-    body = es.Body(x=x, volume=volume, material=RUBBER, surface=surface, velocity=(1.0, 2.0))
+    body = es.Body(x=x, volume=volume, material=COMPRESSIBLE, surface=surface, velocity=(1.0, 2.0))
     clamp = es.Clamped((0, 0), (-1, 0), lambda X: X[:, 1] > 0.45)
     simulation = es.Simulation(body, boundaries=[clamp], reference=es.Never())
     held = (x[:, 0] < 0.05) & (x[:, 1] > 0.45)
@@ -92,7 +93,9 @@ def test_it_holds_a_patch_and_particles_on_the_plane():
 
 def test_single_precision():
     x, volume = box((0, 0, 0), (1, 0.5, 0.5), 0.125)
-    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=np.c_[np.zeros((len(x), 1)), 5.0 * x[:, :1], x[:, :1]])
+    body = es.Body(
+        x=x, volume=volume, material=COMPRESSIBLE, velocity=np.c_[np.zeros((len(x), 1)), 5.0 * x[:, :1], x[:, :1]]
+    )
     runs = []
     for dtype in (wp.float64, wp.float32):
         clamp = es.Clamped((0, 0, 0), (-1, 0, 0))

@@ -6,6 +6,7 @@ import random
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -54,6 +55,7 @@ class Disk:
 
     def __init__(self, monkeypatch, fail):
         self.calls = {"write": 0, "fsync": 0, "replace": 0}
+        self.order = []
         self.real = {kind: getattr(os, kind) for kind in self.calls}
         self.fail = fail
         for kind in self.calls:
@@ -61,11 +63,40 @@ class Disk:
 
     def call(self, kind, *arguments):
         self.calls[kind] += 1
+        self.order.append(kind)
         if self.fail(kind, self.calls[kind]):
             if kind == "write":  # half of it arrives
                 self.real[kind](arguments[0], bytes(arguments[1])[: len(arguments[1]) // 2])
             raise OSError(errno.EIO, "Input/output error")
         return None if kind == "fsync" else self.real[kind](*arguments)
+
+    def ends_of_files(self):
+        """(kind, number) of each call, but of the writes in a row that make up a file the first and the last only."""
+        numbers = dict.fromkeys(self.calls, 0)
+        for before, kind, after in zip([None, *self.order], self.order, [*self.order[1:], None], strict=False):
+            numbers[kind] += 1
+            if kind != "write" or before != kind or after != kind:
+                yield kind, numbers[kind]
+
+
+def few(simulation):
+    """The recording of ``run``, but one probe by steps and one by time: a file of every kind."""
+    whole = recording(simulation)
+    return replace(whole, probes=[whole.probes[0], whole.probes[-1]])
+
+
+def run_few(directory, **options):
+    """A short run with a file of every kind."""
+    simulation = plate()
+    record(simulation, directory, SHORT, few(simulation), **options)
+
+
+@pytest.fixture(scope="module")
+def short_few(tmp_path_factory):
+    """Contents of such a run without failures."""
+    directory = tmp_path_factory.mktemp("few")
+    run_few(directory)
+    return contents(directory)
 
 
 @pytest.fixture(scope="module")
@@ -76,28 +107,28 @@ def short(tmp_path_factory):
     return contents(directory)
 
 
-def test_every_failing_write_fsync_and_rename(short, tmp_path, monkeypatch):
-    """Fail the n-th call of each kind, for every n there is: a clean error, and a resume that leaves no trace."""
+def test_every_failing_write_fsync_and_rename(short_few, tmp_path, monkeypatch):
+    """Fail each call of each kind: a clean error, and a resume that leaves no trace."""
     with monkeypatch.context() as patch:
         disk = Disk(patch, lambda kind, n: False)
-        run(tmp_path / "count", until=SHORT)
+        run_few(tmp_path / "count")
     assert min(disk.calls.values()) > 10
-    raised = 0
-    for kind, calls in disk.calls.items():
-        for n in range(1, calls + 1):
-            directory = tmp_path / f"{kind} {n}"
-            with monkeypatch.context() as patch:
-                Disk(patch, lambda k, i, kind=kind, n=n: (k, i) == (kind, n))
-                try:
-                    run(directory, until=SHORT)
-                except OSError as error:
-                    assert error.errno == errno.EIO
-                    raised += 1
-                Disk(patch, lambda kind, n: False)
-                run(directory, until=SHORT, resume=True)
-            assert contents(directory) == short, f"{kind} number {n}"
+    failing, raised = list(disk.ends_of_files()), 0
+    assert len(failing) > 80
+    for kind, n in failing:
+        directory = tmp_path / f"{kind} {n}"
+        with monkeypatch.context() as patch:
+            Disk(patch, lambda k, i, kind=kind, n=n: (k, i) == (kind, n))
+            try:
+                run_few(directory)
+            except OSError as error:
+                assert error.errno == errno.EIO
+                raised += 1
+            Disk(patch, lambda kind, n: False)
+            run_few(directory, resume=True)
+        assert contents(directory) == short_few, f"{kind} number {n}"
     # Only the note on how the run goes may fail unheard: two files, each a write, two fsyncs and a rename.
-    assert raised >= sum(disk.calls.values()) - 8
+    assert raised >= len(failing) - 8
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])

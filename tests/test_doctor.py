@@ -1,6 +1,7 @@
 """``warp-eulsph doctor`` says what is there, and notices when something is not."""
 
 import importlib.metadata
+from pathlib import Path
 
 import pytest
 import warp as wp
@@ -13,12 +14,17 @@ def test_doctor_tells_versions_devices_and_speed(capsys, monkeypatch, device):
     monkeypatch.setattr(doctor, "SIDE", 5)
     monkeypatch.setattr(doctor, "STEPS", 2)
     assert main(["doctor"]) == 0
-    lines = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    shown = capsys.readouterr().out
+    lines = dict(line.split(maxsplit=1) for line in shown.splitlines())
     assert lines["warp-lang"] == importlib.metadata.version("warp-lang")
     assert lines["kernel"] == f"cache   {wp.config.kernel_cache_dir}"
     assert lines["device"].startswith(device.alias)
     speed = float(lines["speed"].split()[1])
     assert 1e3 < speed < 1e9 and "5³ particles" in lines["speed"]
+    if device.is_cpu:
+        page = (Path(__file__).parents[1] / "docs" / "performance.md").read_text(encoding="utf-8")
+        assert f"{doctor.RECORDED / 1e6:.1f} M particle-steps/s\non two cores" in page
+        assert "of what docs/performance.md has of two cores, 9e+05" in shown
 
 
 def test_doctor_notices_what_is_missing_and_what_is_wrong(capsys, monkeypatch):

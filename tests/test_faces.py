@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import warp as wp
-from loads import RUBBER, external, forces_of
+from bodies import COMPRESSIBLE
+from loads import external, forces_of
 
 import warp_eulsph as es
 from warp_eulsph.geometry import BodyCentred, Relaxation, Staggered, box, disc, nodes, sphere
@@ -89,7 +90,7 @@ def test_a_turned_box_needs_no_normal():
 
 def test_true_area_vectors_are_taken_as_they_are():
     x, volume, surface = nodes((0, 0), (1, 2), 0.1)
-    body = es.Body(x=x, volume=volume, material=RUBBER, surface=surface)
+    body = es.Body(x=x, volume=volume, material=COMPRESSIBLE, surface=surface)
     for condition in (
         es.Pressure(1.0, lambda X: X[:, 0] > 0.95, normal=(1, 0)),
         es.Pressure(1.0, lambda X: X[:, 0] > 0.95),
@@ -105,7 +106,7 @@ def test_pressure_follows_the_face(condition):
     """Nanson's rule: the force of a body that is turned, stretched and sheared by A is p cof(A) n."""
     condition = condition or es.Pressure(1e5, lambda X: X[:, 0] > 0.5, normal=(1, 0, 0))
     x, volume = box((0, 0, 0), (1, 1, 1), 1 / 8)
-    simulation = es.Simulation(es.Body(x=x, volume=volume, material=RUBBER), boundaries=[condition])
+    simulation = es.Simulation(es.Body(x=x, volume=volume, material=COMPRESSIBLE), boundaries=[condition])
     A = np.array([[0.9, -0.5, 0.1], [0.6, 1.1, 0.0], [0.0, 0.3, 1.2]])
     cofactor = np.linalg.det(A) * np.linalg.inv(A).T
     U = simulation.stepper.U
@@ -123,7 +124,7 @@ def test_books_close_under_loads_on_faces(reference, dtype, closes):
         es.Pressure(1e5, lambda X: X[:, 1] > 0.5),
         es.Traction((2e5, 1e5), (1, 0), lambda X: X[:, 0] > 0.9),
     ]
-    body = es.Body(x=x, volume=volume, material=RUBBER)
+    body = es.Body(x=x, volume=volume, material=COMPRESSIBLE)
     simulation = es.Simulation(body, boundaries=conditions, reference=reference, dtype=dtype)
     simulation.step(60)
     energy = simulation.energy()
@@ -146,14 +147,16 @@ def test_a_load_varies_along_the_face():
 
 def test_ghosts_carry_no_load():
     x, volume = box((0, 0), (1, 1), 0.1)
-    body, wall = es.mirror(es.Body(x=x, volume=volume, material=RUBBER), point=(0, 0), normal=(0, -1), depth=5.2 * 0.1)
+    body, wall = es.mirror(
+        es.Body(x=x, volume=volume, material=COMPRESSIBLE), point=(0, 0), normal=(0, -1), depth=5.2 * 0.1
+    )
     simulation = es.Simulation(body, boundaries=[wall, es.Traction((1.0, 0.0), (1, 0), lambda X: X[:, 0] > 0.9)])
     np.testing.assert_allclose(external(simulation).sum(axis=0), (1.0, 0.0), rtol=1e-13)
 
 
 def test_two_bodies_have_a_face_each():
     x, volume = box((0, 0), (1, 1), 0.1)
-    bodies = [es.Body(x=x + 2.0 * k, volume=volume, material=RUBBER, name=str(k)) for k in range(2)]
+    bodies = [es.Body(x=x + 2.0 * k, volume=volume, material=COMPRESSIBLE, name=str(k)) for k in range(2)]
     simulation = es.Simulation(bodies, boundaries=[es.Traction((1.0, 0.0), (1, 0))])
     np.testing.assert_allclose(external(simulation)[:100].sum(axis=0), (1.0, 0.0), rtol=1e-13)
     np.testing.assert_allclose(external(simulation)[100:].sum(axis=0), (1.0, 0.0), rtol=1e-13)

@@ -59,7 +59,7 @@ def smooth(configuration, theta, f):
     values = rows_of(f, configuration)
     out = wp.zeros_like(values)
     arguments = [configuration.particles, configuration.fields, configuration.near, theta, values, slopes, out]
-    wp.launch(make_linear_exact(space, components), n, arguments)
+    wp.launch(make_linear_exact(space, components), n, [0, *arguments])
     return out.numpy().astype(float)
 
 

@@ -10,7 +10,17 @@ import warp as wp
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-from warp_eulsph.output import FIELDS, SnapshotWriter, read_snapshot, write_snapshot
+from warp_eulsph.output import (
+    DEFAULT_FIELDS,
+    FIELDS,
+    Recording,
+    Run,
+    SnapshotWriter,
+    read_snapshot,
+    record,
+    write_snapshot,
+)
+from warp_eulsph.pictures import quantity
 
 DENSITY, YOUNG, POISSON = 1100.0, 17e6, 0.3
 
@@ -68,7 +78,7 @@ def test_read_back_bit_for_bit(simulation, tmp_path, dtype):
     np.testing.assert_array_equal(snapshot.fields["velocity"], simulation.v.astype(dtype))
     np.testing.assert_array_equal(snapshot.fields["deformation_gradient"], simulation.F.astype(dtype))
     np.testing.assert_array_equal(snapshot.fields["body"], np.repeat([0, 1], n // 2))
-    assert set(snapshot.fields) == set(FIELDS)
+    assert set(snapshot.fields) == set(DEFAULT_FIELDS)
     for name, values in snapshot.fields.items():
         assert values.shape == (n, *FIELDS[name].shape(d)), name
         assert values.dtype == (np.int32 if name in ("body", "particle") else dtype), name
@@ -190,3 +200,36 @@ def test_run_takes_a_directory(tmp_path):
     simulation.run(until=1.1e-3, output=tmp_path / "run")
     names = sorted(file.name for file in (tmp_path / "run" / "snap").iterdir())
     assert len(names) == 2 and (tmp_path / "run" / "run.vtkhdf.series").exists()
+
+
+def test_fields_that_are_asked_for(simulation, tmp_path):
+    write_snapshot(tmp_path / "a.vtkhdf", simulation, fields=FIELDS, dtype=np.float64)
+    fields = read_snapshot(tmp_path / "a.vtkhdf").fields
+    asked = ["displacement", "acceleration", "force", "first_piola", "strain_energy_density", "mismatch"]
+    assert list(FIELDS)[-6:] == asked and not {*asked} & {*DEFAULT_FIELDS}
+    for name in asked:
+        np.testing.assert_array_equal(fields[name], getattr(simulation, name))
+        assert fields[name].any()
+    mass = DENSITY * 0.25**simulation.space.dim
+    np.testing.assert_allclose(fields["acceleration"] * mass, fields["force"], rtol=1e-14)
+
+
+def test_fields_that_are_asked_for_are_of_the_particles_chosen_and_drawn(tmp_path):
+    simulation = simulate(2)
+    chosen = [3, 17, 20]
+    record(simulation, tmp_path, 2e-3, Recording(fields=FIELDS, region=chosen, dtype=np.float64))
+    run = Run(tmp_path)
+    for name in ("displacement", "force", "first_piola", "mismatch"):
+        np.testing.assert_array_equal(run[-1].field(name), getattr(simulation, name)[chosen])
+    assert len(run.fields) == len(set(run.fields)) and run.units["first_piola"] == "Pa"
+    assert {"displacement", "first_piola"} <= {*run.to_xarray()}
+    assert quantity(run[-1], "displacement.x").label == "displacement x [m]"
+
+
+def test_default_fields_stay_small(tmp_path):
+    """What a file holds of a particle besides its position, in single precision."""
+    simulation = simulate(2)
+    write_snapshot(tmp_path / "a.vtkhdf", simulation)
+    with h5py.File(tmp_path / "a.vtkhdf") as file:
+        stored = sum(data.nbytes for data in file["VTKHDF/PointData"].values())
+    assert stored == 116 * len(simulation.x)  # 29 numbers, vectors and tensors of three components as VTK has them

@@ -6,15 +6,14 @@ import sys
 import numpy as np
 import pytest
 import warp as wp
-from bodies import RUBBER, lattice
+from bodies import RUBBER
 from clouds import cloud
 from kept_runs import StopAfter, contents, killed_until_done
 from test_materials import Remembering
-from test_resume import REFERENCES, SCHEMES, bits, reachable
+from test_resume import REFERENCES, SCHEMES, bits
 
 import warp_eulsph as es
 from warp_eulsph import boundaries, execution, sorting
-from warp_eulsph.bench.mixing import stirred_cube
 from warp_eulsph.boundaries import Bound
 from warp_eulsph.output import PointProbe, ReactionProbe, Recording, Run, SectionProbe, record
 from warp_eulsph.output.checkpoint import take
@@ -160,6 +159,7 @@ CONDITIONS = {
     "BodyForce by initial positions": es.BodyForce(lambda X, t: 1e5 * X[:, ::-1], TOP, material=True),
     "BodyForce by initial positions on the device": es.BodyForce(push, TOP, material=True),
     "Clamped": es.Clamped((0.0, 0.0), (-1.0, 0.0)),
+    "Damping": es.Damping(body="free"),
     "Gravity": es.Gravity(1e4, body="free"),
     "Pressure": es.Pressure(1e6, body="free"),
     "Pressure on a face": es.Pressure(lambda x, t: 1e6 * x[:, 0], TOP, normal=(0.0, 1.0)),
@@ -209,7 +209,7 @@ def test_conditions_that_do_not_say_so_keep_particles_where_they_are(caplog):
     order = np.random.default_rng(0).permutation(64)
     with caplog.at_level(logging.INFO, logger="warp_eulsph.sorting"):
         simulation = two_blocks(order=order, conditions=[Shaken()])
-    assert "not sorted in memory: a condition does not say that it is sortable" in caplog.text
+    assert "not sorted in memory: a condition or interaction does not say that it is sortable" in caplog.text
     assert simulation.sorting.parted() > 0.4 and np.array_equal(simulation.order.places, np.arange(128))
     plain = two_blocks(conditions=[Shaken()])
     simulation.step(5)
@@ -346,51 +346,3 @@ def test_errors_name_the_particle_by_the_users_number():
     assert caught.value.particle == first != simulation.order.places[first]
     where = np.array2string(simulation.x[first], precision=6)
     assert f"particle {first} of body 'free' at x = {where} m has non-finite values" in str(caught.value)
-
-
-def test_lattices_stay_as_they_are(monkeypatch):
-    """Also where their rows are short or run along the first axis."""
-    monkeypatch.setattr(sorting, "STEPS_BETWEEN_SORTS", 4)
-    ticks = (np.arange(7) + 0.5) / 7
-    for rows in ((7, 7, 7), (7, 7, 2), (2, 7, 7), (7, 3, 4)):
-        for axes in ((0, 1, 2), (2, 1, 0)):
-            x = np.stack(np.meshgrid(*[ticks[:m] for m in rows], indexing="ij"), -1)
-            x = x.transpose(*axes, 3).reshape(-1, 3)
-            body = es.Body(x=x, volume=7.0**-3, material=RUBBER, velocity=20.0 * np.sin(3.0 * x))
-            simulation, plain = (es.Simulation(body, sort=on) for on in (True, False))
-            for each_one in (simulation, plain):
-                each_one.step(9)
-            assert bits(simulation) == bits(plain)
-            assert np.array_equal(simulation.order.places, np.arange(len(x)))
-
-
-@pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
-def test_room_in_the_lists_does_not_grow_by_sorting(reference):
-    order = np.random.default_rng(0).permutation(216)
-    rooms = {
-        on: two_blocks(3, order=order, sort=on, reference=reference).configuration.lists.capacity
-        for on in (True, False)
-    }
-    assert rooms[True] == rooms[False]
-
-
-def test_stirred_liquids_are_sorted_as_they_part(monkeypatch):
-    monkeypatch.setattr(sorting, "STEPS_BETWEEN_SORTS", 50)
-    x = lattice(3, 12)
-    cubes = {on: stirred_cube(x, 12, sort=on) for on in (True, False)}
-    assert np.array_equal(cubes[True].order.places, np.arange(len(x)))
-    for cube in cubes.values():
-        cube.step(400)
-    assert not np.array_equal(cubes[True].order.places, np.arange(len(x)))
-    assert cubes[True].sorting.parted() < 0.6 * cubes[False].sorting.parted()
-    # The flow is chaotic for none of these steps: round-off has grown, but not far
-    np.testing.assert_allclose(cubes[True].x, cubes[False].x, atol=1e-6)
-
-
-def test_every_array_lies_where_it_was():
-    """Recorded launches and graphs hold pointers."""
-    simulation = two_blocks()
-    simulation.step(3)
-    before = {path: array.ptr for path, array in reachable(simulation)[0].items()}
-    shuffle(simulation)
-    assert len(before) > 50 and {path: array.ptr for path, array in reachable(simulation)[0].items()} == before

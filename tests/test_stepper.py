@@ -66,9 +66,7 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
     """M12 with κ = 1: at every state correction + dissipation take energy; with κ = ∞ the correction feeds it."""
 
     def powers(stepper, kappa):
-        stabiliser = es.PairAreas(kappa=kappa).build(
-            stepper.space, stepper.particles, stepper.flux, stepper.flux.bodies, stepper.device
-        )
+        stabiliser = es.PairAreas(kappa=kappa).build(stepper.space, stepper.particles, stepper.flux, stepper.device)
         assert stabiliser.takes_dual(stepper.configuration, sensed=False)
         stepper.flux.keep_dual()
         stabiliser.refresh(stepper.configuration, stepper.U)
@@ -138,7 +136,7 @@ def test_ghosts_stay_out_of_the_books():
     whole = block(2, 12, lambda x: np.c_[8.0 * x[:, 0], -3.0 + 0.0 * x[:, 1]])
     left = whole.x[:, 0] < 0.0
     half = es.Body(x=whole.x[left], volume=whole.volume[0], material=whole.material, velocity=whole.velocity[left])
-    depth = 4 * 1.3 / 12
+    depth = 6 * 1.3 / 12
     half, ghosts = es.mirror(half, point=(0.0, 0.0), normal=(1.0, 0.0), depth=depth)
     simulations = [
         es.Simulation(whole, reference=es.Never(), time_step=es.TimeStep(fixed=1e-4)),

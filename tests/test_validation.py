@@ -10,8 +10,7 @@ import pytest
 
 import warp_eulsph as es
 from warp_eulsph.cli import main
-from warp_eulsph.output import Figure
-from warp_eulsph.validation import Case, command, load_all, names
+from warp_eulsph.validation import Case, Figure, command, load_all, names
 from warp_eulsph.validation.figures import difference, order
 from warp_eulsph.validation.history import at, series
 

@@ -94,7 +94,7 @@ def second_derivative(configuration, f):
     out = wp.zeros_like(field)
     structs = [configuration.fields, configuration.near]
     configuration.gradient(field, gradient)
-    wp.launch(make_second_derivative(space, components), n, [*structs, field, gradient, out])
+    wp.launch(make_second_derivative(space, components), n, [0, *structs, field, gradient, out])
     return out.numpy().copy(), gradient.numpy().reshape(n, components, space.dim).copy()
 
 

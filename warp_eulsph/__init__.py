@@ -14,6 +14,7 @@ from .boundaries import (
     BodyForce,
     Boundary,
     Clamped,
+    Damping,
     Fixed,
     Gravity,
     MirrorGhosts,
@@ -26,6 +27,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
+from .interactions import Interaction
 from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
@@ -58,8 +60,10 @@ from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.stabiliser import Correction
 from .scheme.surface_vectors import SurfaceVectors
 from .scheme.tie import Tie
+from .scheme.tilt import Tilt
 from .scheme.time_step import TimeStep
 from .scheme.verlet import Verlet
+from .settling import settle
 from .simulation import Body, Simulation
 from .space import Space
 from .weights import CubicSpline, QuarticSpline, QuinticSpline, Weight, WendlandC2, WendlandC4, WendlandC6
@@ -80,11 +84,13 @@ __all__ = [
     "Correction",
     "CubicSpline",
     "Current",
+    "Damping",
     "DimensionlessSensor",
     "Every",
     "Fixed",
     "FluxCorrectedTransport",
     "Gravity",
+    "Interaction",
     "Lax",
     "LaxWendroff",
     "Linear",
@@ -118,6 +124,7 @@ __all__ = [
     "SurfaceVectors",
     "TaitLiquid",
     "Tie",
+    "Tilt",
     "TimeStep",
     "Traction",
     "UnstableError",
@@ -131,6 +138,7 @@ __all__ = [
     "WendlandC6",
     "WhenDistorted",
     "mirror",
+    "settle",
     "spatial_order",
 ]
 

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from .body import Body
-from .checks import instance, real_number, short
+from .checks import instance, positive, short
 from .overlap import Encounters
 from .scheme.arrangement import Arrangement
 from .scheme.base import Scheme
@@ -32,8 +32,7 @@ def check_options(
     instance(scheme, Scheme, "scheme", "Verlet()")
     instance(time_step, TimeStep, "time_step", "TimeStep(cfl=0.7)")
     instance(weight, Weight, "weight", "CubicSpline()")
-    if not (np.isfinite(real_number(dilation, "dilation")) and dilation > 0.0):
-        raise ValueError(f"dilation must be positive and finite, got {dilation}; 1.3 is the tested value")
+    positive(dilation, "dilation", "1.3 is the tested value")
 
 
 def checked_dtype(given: Any) -> Any:

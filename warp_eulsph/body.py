@@ -1,13 +1,26 @@
 """A solid as particles: what a simulation is built from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from .checks import real_array, spread
+from .checks import instance, positive, real_array, spread
 from .materials import Material
+from .scheme.arrangement import Arrangement
+from .scheme.base import Scheme
+from .scheme.policy import ReferencePolicy
 from .summary import Rows, as_html, as_text, extent, least_to_largest, mass_unit
+from .weights import Weight
+
+#: Options that a body may have of its own, beside the dilation.
+_OWN: tuple[tuple[str, type, str], ...] = (
+    ("reference", ReferencePolicy, "Never()"),
+    ("arrangement", Arrangement, "Convected()"),
+    ("scheme", Scheme, "Verlet()"),
+    ("weight", Weight, "CubicSpline()"),
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -24,6 +37,11 @@ class Body:
             the defect e_a of the initial arrangement, which on a disordered one is noise inside too. Given vectors make
             M10, M11 and M12 work with a fixed reference as well; without them they are zero there.
         name: for boundary conditions and output.
+        reference, arrangement, scheme, weight, dilation: as in ``Simulation``, whose these are where they are None.
+            Bodies that follow each other and agree in all of them are one medium.
+        bonded: name of a body before it that it is bonded to: particles of both that are near each other are
+            neighbours, as in one solid of two materials. Both are of one medium. The outermost particles of each are
+            still its own, so that loads on faces go to regions away from the joint.
 
     Raises:
         ValueError: wrong shapes, entries that are not finite real numbers, volumes or spacings that are not positive.
@@ -38,6 +56,12 @@ class Body:
     velocity: Any = 0.0
     surface: Any = None
     name: str = "body"
+    reference: ReferencePolicy | None = None
+    arrangement: Arrangement | None = None
+    scheme: Scheme | None = None
+    weight: Weight | None = None
+    dilation: float | None = None
+    bonded: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -60,6 +84,11 @@ class Body:
         self._keep("velocity", self._field("velocity", self.velocity, x.shape))
         if self.surface is not None:
             self._keep("surface", self._field("surface", self.surface, x.shape))
+        for name, kind, example in _OWN:
+            if getattr(self, name) is not None:
+                instance(getattr(self, name), kind, f"body {self.name!r}: {name}", example)
+        if self.dilation is not None:
+            positive(self.dilation, f"body {self.name!r}: dilation", "1.3 is the tested value")
 
     def _keep(self, name: str, values: np.ndarray) -> None:
         """A copy that nobody changes by accident."""
@@ -104,7 +133,7 @@ def checked_bodies(bodies: list[Body]) -> list[Body]:
     """The bodies, if one simulation can run them.
 
     Raises:
-        ValueError: none, equal names, different dimensions, surfaces given for some only.
+        ValueError: none, equal names, different dimensions, surfaces given for some only, bonds to what is not there.
     """
     if not bodies:
         raise ValueError("a simulation needs at least one body, got none")
@@ -114,7 +143,23 @@ def checked_bodies(bodies: list[Body]) -> list[Body]:
     given = [body.name for body in bodies if body.surface is not None]
     if given and len(given) < len(bodies):
         raise ValueError(f"surface must be given for all bodies or for none, got it for {given} of {names}")
+    for k, body in enumerate(bodies):
+        if body.bonded is None:
+            continue
+        who, before = f"body {body.name!r}", names[:k]
+        if body.bonded not in before:
+            raise ValueError(f"{who}: bonded must be a body before it, of {before}, got {body.bonded!r}")
+        if body.material.flows or bodies[names.index(body.bonded)].material.flows:
+            raise ValueError(f"{who}: bonded bodies must not flow; join liquids by an interaction")
     dims = {body.name: body.x.shape[1] for body in bodies}
     if len(set(dims.values())) > 1:
         raise ValueError(f"bodies must have the same dimension, got {dims}")
     return bodies
+
+
+def groups_of(bodies: Sequence[Body]) -> list[int]:
+    """Number of the bodies that each is bonded to, with what those are bonded to: equal for all that are connected."""
+    groups: dict[str, int] = {}
+    for k, body in enumerate(bodies):
+        groups[body.name] = k if body.bonded is None else groups[body.bonded]
+    return list(groups.values())

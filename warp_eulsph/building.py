@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .body import Body
+from .body import Body, groups_of
 from .failure import place_of
 from .fields import allocate, part
 from .scheme.arrangement import Arrangement
@@ -35,6 +35,7 @@ class MediumPlan:
     """A medium to be: bodies that follow each other, with the same options.
 
     Attributes:
+        options: the reference is Never() where the arrangement does not move.
         span: numbers of its particles.
     """
 
@@ -48,15 +49,9 @@ class MediumPlan:
         return len(self.span)
 
     @property
-    def moving(self) -> list[bool]:
-        """Whether the arrangement of each body moves with the reference."""
-        reference, arrangement = self.options.reference, self.options.arrangement
-        return [not reference.fixed and arrangement.moves(body.material) for body in self.bodies]
-
-    @property
     def moves(self) -> bool:
-        """Whether any of them does."""
-        return any(self.moving)
+        """Whether the reference moves."""
+        return not self.options.reference.fixed
 
     @property
     def reach(self) -> float:
@@ -65,9 +60,8 @@ class MediumPlan:
 
     def build(self, space: Space, particles: Any, box: Any, device: Any) -> MediumParts:
         """Allocate; ``particles`` are those of all media."""
-        scheme, moving, own = self.options.scheme, self.moving, part(space, particles, "Particles", self.span)
-        policy = self.options.reference if self.moves else Never()
-        given = self.bodies[0].surface is not None
+        scheme, policy, given = self.options.scheme, self.options.reference, self.bodies[0].surface is not None
+        own = part(space, particles, "Particles", self.span)
         flux = Flux(space, [(body.material, len(body.x)) for body in self.bodies], own, device)
         configuration = Configuration(
             space,
@@ -75,20 +69,51 @@ class MediumPlan:
             own,
             box,
             device,
-            moving=[body for body, moves in zip(flux.bodies, moving, strict=True) if moves],
+            fixed=policy.fixed,
             corrected=is_corrected(scheme, policy, given),
+            tilt=scheme.tilt,
         )
-        return MediumParts(scheme, policy, self.span, own, flux, configuration, moving, given)
+        return MediumParts(scheme, policy, self.span, own, flux, configuration, given, groups_of(self.bodies))
 
 
 def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
     """The media of these bodies, in their order.
 
     Raises:
-        ValueError: options that do not suit a material.
+        ValueError: options that do not suit a material, or schemes of different kinds.
     """
-    check_reference([body.material for body in bodies], defaults.reference)
-    return [MediumPlan(bodies, defaults, range(sum(len(body.x) for body in bodies)))]
+    ranges = ranges_of(bodies)
+    media: list[MediumPlan] = []
+    for body in bodies:
+        options = options_of(body, defaults)
+        check_reference([body.material], options.reference)
+        if type(options.scheme) is not type(defaults.scheme):
+            raise ValueError(
+                f"scheme of body {body.name!r} must be {type(defaults.scheme).__name__}(...), as the simulation's, for "
+                f"all take the same steps, got {options.scheme}; pass scheme={type(options.scheme).__name__}(...) to "
+                "the simulation"
+            )
+        together, span = [body], ranges[body.name]
+        if not options.arrangement.moves(body.material):
+            options = options._replace(reference=Never())
+        if media and media[-1].options == options:
+            before = media.pop()
+            together, span = [*before.bodies, body], range(before.span.start, span.stop)
+        media.append(MediumPlan(together, options, span))
+    for medium in media:
+        for body in medium.bodies:
+            if body.bonded not in (None, *(other.name for other in medium.bodies)):
+                raise ValueError(
+                    f"bodies {body.bonded!r} and {body.name!r} are bonded and must be of one medium; give them the "
+                    "same options, and no body with others between them"
+                )
+    return media
+
+
+def options_of(body: Body, defaults: Options) -> Options:
+    """The options of a body: its own, and for those that are None the defaults."""
+    own = {name: getattr(body, name) for name in Options._fields}
+    return defaults._replace(**{name: value for name, value in own.items() if value is not None})
 
 
 def ranges_of(bodies: Sequence[Body]) -> dict[str, range]:
@@ -111,6 +136,7 @@ def make_particles(space: Space, media: Sequence[MediumPlan], device: Any) -> An
     particles.spacing.assign(spacing)
     particles.share.fill_(1.0)
     particles.body.assign(np.repeat(np.arange(len(counts)), counts))
+    particles.group.assign(np.repeat(groups_of(bodies), counts))
     return particles
 
 

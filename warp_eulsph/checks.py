@@ -110,6 +110,17 @@ def real_number(given: Any, who: str) -> float:
     return float(given)
 
 
+def positive(given: Any, who: str, remedy: str) -> float:
+    """``given`` as a number above 0 and finite.
+
+    Raises:
+        ValueError: it is none; the message has the ``remedy``.
+    """
+    if not (math.isfinite(real_number(given, who)) and given > 0.0):
+        raise ValueError(f"{who} must be positive and finite, got {given}; {remedy}")
+    return float(given)
+
+
 def checked_box(periodic: Sequence[float] | None, dim: int) -> tuple[float, ...]:
     """Lengths of the periodic box [m], 0 where it is open.
 

@@ -1,15 +1,18 @@
 """Momenta, extrema and sums over parts of a state, reduced on the device in float64."""
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from .fields import neighbour_structure, structure
+from .atomics import raise_to
+from .execution import Launcher, launch
+from .fields import neighbour_structure, part_of, structure
 from .linalg import det, inverse
 from .reduce import Sum, SumOfParticles
-from .scheme.reference import Configuration
+from .scheme.medium import Medium
 from .space import Space, difference
 
 _Vec6 = wp.types.vector(length=6, dtype=wp.float64)
@@ -44,8 +47,8 @@ def _make_jacobian(space: Space) -> Any:
     determinant = det(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def jacobian(F: wp.array(dtype=mat), out: wp.array(dtype=real)):
-        a = wp.tid()
+    def jacobian(first: int, F: wp.array(dtype=mat), out: wp.array(dtype=real)):
+        a = first + wp.tid()
         out[a] = determinant(F[a])
 
     return jacobian
@@ -53,16 +56,23 @@ def _make_jacobian(space: Space) -> Any:
 
 @functools.cache
 def _make_extrema(space: Space) -> Any:
-    """Kernel: least and largest det F, largest speed; minima and maxima do not depend on the order."""
+    """Kernel: largest −det F, det F and speed; maxima do not depend on the order."""
     State, determinant, real = structure(space, "State"), det(space), space.real
+    raise_largest = raise_to(real)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def find_extrema(state: State, out: wp.array(dtype=real)):
-        a = wp.tid()
+    def find_extrema(
+        first: int,
+        state: State,
+        most_negative: wp.array(dtype=real),
+        largest: wp.array(dtype=real),
+        fastest: wp.array(dtype=real),
+    ):
+        a = first + wp.tid()
         J = determinant(state.F[a])
-        wp.atomic_min(out, 0, J)
-        wp.atomic_max(out, 1, J)
-        wp.atomic_max(out, 2, wp.length(state.v[a]))
+        raise_largest(most_negative, -J)
+        raise_largest(largest, J)
+        raise_largest(fastest, wp.length(state.v[a]))
 
     return find_extrema
 
@@ -77,6 +87,7 @@ def _make_mismatch(space: Space, fixed: bool) -> Any:
         structure(space, "State"),
     )
     Neighbours, separation, invert = neighbour_structure(space), difference(space), inverse(space)
+    raise_largest = raise_to(real)
 
     @wp.func
     def strain(a: int, state: State, reference: Reference) -> mat:
@@ -104,7 +115,7 @@ def _make_mismatch(space: Space, fixed: bool) -> Any:
             r = state.x[b] - reference.x[b] - u_a - half @ separation(reference.x[b], X_a, near.box)
             total += near.w[k] * wp.dot(r, r)
         out[a] = wp.sqrt(total / wp.max(reference.diagonal[a], real(1e-30))) / particles.spacing[a]
-        wp.atomic_max(largest, 0, out[a])
+        raise_largest(largest, out[a])
 
     return mismatch
 
@@ -115,9 +126,8 @@ def _make_body_sums(space: Space) -> Any:
     Particles, State, dim = structure(space, "Particles"), structure(space, "State"), space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
-    def body_sums(first: int, particles: Particles, state: State, out: wp.array(dtype=_Vec11)):
-        i = wp.tid()
-        a = first + i
+    def body_sums(first: int, begin: int, particles: Particles, state: State, out: wp.array(dtype=_Vec11)):
+        a = first + wp.tid()
         m = wp.float64(particles.share[a] * particles.mass[a])
         x = wp.vec3d()
         v = wp.vec3d()
@@ -126,7 +136,7 @@ def _make_body_sums(space: Space) -> Any:
             v[k] = wp.float64(state.v[a][k])
         L = wp.cross(x, v)
         kinetic = wp.float64(0.5) * wp.dot(v, v)
-        out[i] = m * _Vec11(wp.float64(1.0), x[0], x[1], x[2], v[0], v[1], v[2], L[0], L[1], L[2], kinetic)
+        out[a - begin] = m * _Vec11(wp.float64(1.0), x[0], x[1], x[2], v[0], v[1], v[2], L[0], L[1], L[2], kinetic)
 
     return body_sums
 
@@ -137,8 +147,8 @@ def _make_section(space: Space) -> Any:
     Forces, dim = structure(space, "Forces"), space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
-    def section(indices: wp.array(dtype=wp.int32), forces: Forces, out: wp.array(dtype=wp.vec3d)):
-        k = wp.tid()
+    def section(first: int, indices: wp.array(dtype=wp.int32), forces: Forces, out: wp.array(dtype=wp.vec3d)):
+        k = first + wp.tid()
         a = indices[k]
         total = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a]
         force = wp.vec3d()
@@ -157,7 +167,7 @@ class BodySums:
     """
 
     def __init__(self, space: Space, particles: Any, body: range, device: Any):
-        self.space, self.particles, self.body, self.device = space, particles, body, device
+        self.space, self.particles, self.body, self._launch = space, particles, body, Launcher(device)
         self._each = wp.zeros(len(body), dtype=_Vec11, device=device)
         self._total, self._sum = wp.zeros(1, dtype=_Vec11, device=device), Sum(_Vec11, len(body), device)
 
@@ -165,7 +175,7 @@ class BodySums:
         """Of ``state``: centre of mass [m] and momentum [kg m/s], (dim,); angular momentum about the origin
         [kg m²/s], (3,); kinetic energy [J], ()."""
         arguments = [self.body.start, self.particles, state, self._each]
-        wp.launch(_make_body_sums(self.space), len(self.body), arguments, device=self.device)
+        self._launch(_make_body_sums(self.space), len(self.body), arguments, self.body.start)
         self._sum(self._each, self._total)
         total, dim = self._total.numpy()[0].copy(), self.space.dim
         return {
@@ -185,13 +195,14 @@ class SectionForce:
 
     def __init__(self, space: Space, places: wp.array):
         self.space, self.device, self._places = space, places.device, places
+        self._launch = Launcher(self.device)
         self._each, self._total = (wp.zeros(k, dtype=wp.vec3d, device=self.device) for k in (len(places), 1))
         self._sum = Sum(wp.vec3d, len(places), self.device)
 
     def __call__(self, forces: Any) -> np.ndarray:
         """[N], (dim,), from the step's ``forces``: what acts between the particles themselves cancels in the sum."""
         arguments = [self._places, forces, self._each]
-        wp.launch(_make_section(self.space), len(self._places), arguments, device=self.device)
+        self._launch(_make_section(self.space), len(self._places), arguments)
         self._sum(self._each, self._total)
         return self._total.numpy()[0][: self.space.dim].copy()
 
@@ -201,20 +212,23 @@ class Diagnostics:
 
     def __init__(self, space: Space, particles: Any, device: Any):
         self.space, self.particles, self.device = space, particles, device
+        self._launch = Launcher(device)
         self._total = wp.zeros(1, dtype=_Vec6, device=device)
-        self._extrema = wp.zeros(3, dtype=space.real, device=device)
+        self._extrema = [wp.zeros(1, dtype=space.real, device=device) for _ in range(3)]
         self._sum = SumOfParticles(_Vec6, len(particles.mass), device)
         self._mismatch = wp.zeros(0, dtype=space.real, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
 
-    def mismatch(self, configuration: Configuration, state: Any) -> tuple[wp.array, float]:
+    def mismatch(self, media: Sequence[Medium], state: Any) -> tuple[wp.array, float]:
         """How far positions and F disagree around each particle, in spacings, (n,) on the device, and the largest."""
         if len(self._mismatch) == 0:
             self._mismatch = wp.zeros(len(state.x), dtype=self.space.real, device=self.device)
         self._largest.zero_()
-        arguments = [0, self.particles, configuration.fields, configuration.near, state, self._mismatch, self._largest]
-        kernel = _make_mismatch(self.space, configuration.fixed)
-        wp.launch(kernel, len(state.x), arguments, device=self.device)
+        for medium in media:
+            configuration, out = medium.configuration, part_of(self._mismatch, medium.span)
+            arguments = [medium.particles, configuration.fields, configuration.near, medium.of(state), out]
+            kernel = _make_mismatch(self.space, configuration.fixed)
+            self._launch(kernel, medium.n, [*arguments, self._largest])
         return self._mismatch, float(self._largest.numpy()[0])
 
     def momenta(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -225,10 +239,11 @@ class Diagnostics:
 
     def extrema(self, state: Any) -> tuple[float, float, float]:
         """Least and largest det F [-], and largest speed [m/s]."""
-        self._extrema.assign([np.inf, -np.inf, 0.0])
-        wp.launch(_make_extrema(self.space), len(state.x), [state, self._extrema], device=self.device)
-        least, largest, speed = self._extrema.numpy().tolist()
-        return least, largest, speed
+        for array, least in zip(self._extrema, (-np.inf, -np.inf, 0.0), strict=True):
+            array.fill_(least)
+        self._launch(_make_extrema(self.space), len(state.x), [state, *self._extrema])
+        most_negative, largest, speed = (float(array.numpy()[0]) for array in self._extrema)
+        return -most_negative, largest, speed
 
     def jacobians(self, state: Any) -> np.ndarray:
         """det F of each particle, (n,)."""
@@ -237,5 +252,5 @@ class Diagnostics:
     def volume_ratios(self, state: Any) -> wp.array:
         """det F of each particle, (n,), on the device."""
         found = wp.empty(len(state.F), dtype=self.space.real, device=self.device)
-        wp.launch(_make_jacobian(self.space), len(found), [state.F, found], device=self.device)
+        launch(_make_jacobian(self.space), len(found), [state.F, found], self.device)
         return found

@@ -17,6 +17,8 @@ from typing import Any
 
 import warp as wp
 
+from .turns import in_child, turn
+
 # Below this many particles a pointwise kernel takes less time than handing it to a thread (some 20 µs).
 LEAST_RANGE = 2048
 # More ranges than threads, so that a core that is busy elsewhere takes fewer of them.
@@ -25,7 +27,8 @@ RANGES_PER_THREAD = 4
 MOST_RECORDED = 256
 
 
-def _cores() -> int:
+def cores() -> int:
+    """Cores that the process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -39,7 +42,7 @@ def _from_environment() -> tuple[int, bool, bool | None]:
     recorded = os.environ.get("WARP_EULSPH_GRAPHS", "auto")
     if recorded not in ("auto", "0", "1"):
         raise ValueError(f"WARP_EULSPH_GRAPHS must be auto, 0 or 1, got {recorded!r}")
-    return int(given) if given else _cores(), vectors == "1", {"auto": None, "0": False, "1": True}[recorded]
+    return int(given) if given else cores(), vectors == "1", {"auto": None, "0": False, "1": True}[recorded]
 
 
 _wrong: str | None = None
@@ -60,9 +63,10 @@ def set_threads(count: int | None = None) -> None:
     global _threads, _pool
     if count is not None and count < 1:
         raise ValueError(f"threads must be at least 1, got {count}; None takes all cores")
-    if _pool is not None:
-        _pool.shutdown()
-    _threads, _pool = _cores() if count is None else count, None
+    with turn:
+        if _pool is not None:
+            _pool.shutdown()
+        _threads, _pool = cores() if count is None else count, None
 
 
 def set_simd(on: bool) -> None:
@@ -124,22 +128,14 @@ class Launcher:
         The kernel's first parameter, which is not among ``arguments``, is the index that its thread 0 has. It must
         write to its own particle only.
         """
-        whole = not self.device.is_cpu or self.device.is_capturing  # a graph on the CPU runs on one thread
-        ranges = ((0, n),) if whole else _ranges(n, each)
-        commands = self._commands(kernel, ranges, arguments, first)
-        if len(ranges) == 1:
-            commands[0].launch()
-            return
-        # A launch on the CPU releases the interpreter's lock while it runs; whoever is free takes the next range.
-        rest = iter(commands)
-        waiting = [_workers().submit(_take, rest) for _ in range(min(_threads, len(ranges)) - 1)]
-        _take(rest)
-        for worker in waiting:
-            worker.result()
+        if n:
+            with turn:
+                _together(self._commands(kernel, _ranges_on(self.device, n, each), arguments, first))
 
     def once(self, kernel: Any, dim: int, arguments: Sequence[Any]) -> None:
-        """Launch a kernel of ``dim`` threads that has no such parameter, in one piece."""
-        self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
+        """Launch a kernel of ``dim`` threads, few, that has no such parameter, in one piece."""
+        with turn:
+            self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
 
     def forget(self) -> None:
         """Let go of the recorded launches and of the arrays they hold."""
@@ -153,18 +149,50 @@ class Launcher:
         if known is None:
             if len(self._recorded) >= MOST_RECORDED:
                 self.forget()
-            lead = [[] if first is None else [first + begin] for begin, _ in ranges]
-            commands = [
-                wp.launch(kernel, end - begin, [*own, *arguments], device=self.device, record_cmd=True)
-                for own, (begin, end) in zip(lead, ranges, strict=True)
-            ]
+            commands = _recorded(kernel, ranges, arguments, first, self.device)
             known = self._recorded[key] = commands, arguments  # keeps the arguments, and so their ids, alive
         return known[0]
+
+
+def launch(kernel: Any, n: int, arguments: Sequence[Any], device: Any, first: int = 0) -> None:
+    """Launch as a ``Launcher`` does, once, for arguments that will not come again."""
+    device = wp.get_device(device)
+    if n:
+        with turn:
+            _together(_recorded(kernel, _ranges_on(device, n), arguments, first, device))
+
+
+def _recorded(
+    kernel: Any, ranges: tuple[tuple[int, int], ...], arguments: Sequence[Any], first: int | None, device: Any
+) -> list[Any]:
+    lead = [[] if first is None else [first + begin] for begin, _ in ranges]
+    return [
+        wp.launch(kernel, end - begin, [*own, *arguments], device=device, record_cmd=True)
+        for own, (begin, end) in zip(lead, ranges, strict=True)
+    ]
+
+
+def _together(commands: list[Any]) -> None:
+    """Launch all of them, on several threads."""
+    if len(commands) == 1:
+        commands[0].launch()
+        return
+    # A launch on the CPU releases the interpreter's lock while it runs; whoever is free takes the next range.
+    rest = iter(commands)
+    waiting = [_workers().submit(_take, rest) for _ in range(min(_threads, len(commands)) - 1)]
+    _take(rest)
+    for worker in waiting:
+        worker.result()
 
 
 def _take(commands: Iterator[Any]) -> None:
     for command in commands:
         command.launch()
+
+
+def _ranges_on(device: Any, n: int, each: int = 1) -> tuple[tuple[int, int], ...]:
+    whole = not device.is_cpu or device.is_capturing  # a graph on the CPU runs on one thread
+    return ((0, n),) if whole else _ranges(n, each)
 
 
 def _ranges(n: int, each: int = 1) -> tuple[tuple[int, int], ...]:
@@ -181,3 +209,12 @@ def _workers() -> ThreadPoolExecutor:
     if _pool is None:
         _pool = ThreadPoolExecutor(_threads - 1, thread_name_prefix="warp-eulsph")
     return _pool
+
+
+def _forget_workers() -> None:
+    """A child process has no thread but its own."""
+    global _pool
+    _pool = None
+
+
+in_child.append(_forget_workers)

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .scheme.health import WELL, UnstableError, last_good
-from .scheme.medium import Medium
+from .scheme.health import UnstableError, last_good
 
 log = logging.getLogger(__name__)
 
@@ -51,26 +50,20 @@ def failure(simulation: Any) -> UnstableError | None:
 def _look_for_tears(simulation: Any) -> UnstableError | None:
     """Note the first tear of a solid and log it, once; it is a failure where the arrangement says so."""
     if simulation.tear is None:
-        simulation.tear = _tear(simulation)
-        if simulation.tear is not None and getattr(simulation.arrangement, "stop_when_torn", False):
-            return simulation.tear  # type: ignore[no-any-return]
-        if simulation.tear is not None:
+        for particle in _first_torn(simulation):
+            body = next(body for body in simulation.bodies if particle in simulation.ranges[body.name])
+            if body.material.flows:  # opens and closes all the time
+                continue
+            simulation.tear = _tear(simulation, particle)
+            if getattr(body.arrangement or simulation.arrangement, "stop_when_torn", False):
+                return simulation.tear  # type: ignore[no-any-return]
             log.warning("%s", simulation.tear)
+            break
     return None
 
 
-def _tear(simulation: Any) -> UnstableError | None:
-    """The first time that a solid came apart; reads the device.
-
-    What flows opens and closes all the time; only a body whose law carries its whole F is meant to hold together.
-    """
-    places = [place for medium in simulation.stepper.media if (place := _torn(medium)) is not None]
-    if not places:
-        return None
-    particle = int(simulation.order.ids.numpy()[min(places)])
-    body = next(body for body in simulation.bodies if particle in simulation.ranges[body.name])
-    if body.material.flows:
-        return None
+def _tear(simulation: Any, particle: int) -> UnstableError:
+    """That a solid has come apart, the first of whose particles with a new face is this one."""
     lost = -simulation.stepper.ledger.accounts()["dissipation"]
     return UnstableError(
         f"a solid comes apart without a law of failure by t = {simulation.t:.8g} s, step {simulation.steps}: the first "
@@ -82,11 +75,12 @@ def _tear(simulation: Any) -> UnstableError | None:
     )
 
 
-def _torn(medium: Medium) -> int | None:
-    """Place among all of the first particle of a medium with a new face; reads the device."""
-    torn = getattr(medium.stabiliser, "torn", None)
-    place = WELL if torn is None else int(torn.numpy()[0])
-    return None if place == WELL else medium.span.start + place
+def _first_torn(simulation: Any) -> list[int]:
+    """Number of the first particle with a new face of each medium that has one; reads the device."""
+    torn = [(medium, getattr(medium.stabiliser, "torn", None)) for medium in simulation.stepper.media]
+    places = [medium.span.start + int(place.numpy()[0]) for medium, place in torn if place is not None]
+    ids = simulation.order.ids.numpy() if places else []
+    return [int(ids[place]) for place in places if place < len(ids)]
 
 
 def where(simulation: Any, particle: int, x: np.ndarray) -> str:

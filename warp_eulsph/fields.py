@@ -28,7 +28,8 @@ PARTICLES = {
     "h": Field("real", "m", "initial smoothing length, dilation times spacing"),
     "spacing": Field("real", "m", "initial particle spacing"),
     "share": Field("real", "-", "1; 0 for ghosts, which energies and momenta leave out"),
-    "body": Field("int", "-", "number of the body; only particles of one body are neighbours"),
+    "body": Field("int", "-", "number of the body"),
+    "group": Field("int", "-", "number of what is bonded together; only particles of one are neighbours"),
 }
 STATE = {
     "x": Field("vec", "m", "position"),
@@ -48,6 +49,7 @@ REFERENCE = {
     ),
     "L": Field("mat", "-", "gradient correction (M3), not symmetric where positions are balanced (M13)"),
     "F": Field("mat", "-", "deformation gradient of the reference, F_k; empty where it is fixed, F_k = I"),
+    "moment": Field("vec", "1/m", "sum of tilted w_ab (x_b - x_a) over the neighbours (M17); empty without tilt"),
     "row": Field("real", "kg/m^(d+2)", "sum of m_b g_ab over the neighbours (M7)"),
     "diagonal": Field("real", "1/m^2", "sum of V_b g_ab over the neighbours, of the graph Laplacian (M13)"),
 }
@@ -55,6 +57,9 @@ FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
     "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
     "tie": Field("mat", "Pa", "share of Q that ties F to the positions (M16); empty where nothing is tied"),
+    "drag": Field(
+        "mat", "Pa", "share of Q that is the dissipation's (M9); empty where its forces are all there is of it"
+    ),
     "speed": Field("real", "m/s", "pressure-wave speed measured in the reference"),
     "impedance": Field("real", "kg/(m^2 s)", "density times pressure-wave speed, both measured in the reference (M9)"),
     "shear_impedance": Field(
@@ -66,7 +71,8 @@ FORCES = {
     "correction": Field("vec", "N", "force of the closed pair areas (M10, M11, M12)"),
     "dissipation": Field("vec", "N", "upwind dissipation (M9)"),
     "tie": Field("vec", "N", "force that ties positions to F (M16)"),
-    "external": Field("vec", "N", "body forces, tractions, pressures"),
+    "external": Field("vec", "N", "body forces, tractions, pressures, damping"),
+    "damping": Field("vec", "N", "share of the external forces that damps motion, zero where nothing does"),
     "free_v": Field("vec", "m/s", "velocity at the end of the step before the conditions were imposed"),
     "reaction": Field("vec", "N", "force that the imposed velocities took, mean over the step"),
 }
@@ -120,8 +126,9 @@ def part_of(array: wp.array, span: range) -> wp.array:
 def neighbour_structure(space: Space) -> Any:
     """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.
 
-    ``w`` is V_b g_ab [1/m²] with g_ab = −W'(r)/r, so that V_b ∇W_ab = w_ab (x_b − x_a); ``box`` [m] holds the lengths
-    of the periodic box, zero where it is open.
+    ``w`` is V_b g_ab [1/m²] with g_ab = −W'(r)/r, so that V_b ∇W_ab = w_ab (x_b − x_a). M3 and M4 take ``own``, M5 the
+    same of the other end, which is 2 w − own; both are w, and ``own`` the same array, unless the weights are tilted
+    (M17). ``box`` [m] holds the lengths of the periodic box, zero where it is open.
     """
 
     @wp.struct
@@ -129,6 +136,7 @@ def neighbour_structure(space: Space) -> Any:
         start: wp.array(dtype=wp.int32)
         index: wp.array(dtype=wp.int32)
         w: wp.array(dtype=space.real)
+        own: wp.array(dtype=space.real)
         box: space.vec
 
     return Neighbours
@@ -140,8 +148,9 @@ def clock_structure(space: Space) -> Any:
 
     ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``longest_dt`` [s] the
     longest of these, ``target`` [s] time that must be hit, ``rate`` [1/s] largest wave speed over spacing, or rate of
-    strain that asks for as short a step, ``bad`` place of the first unphysical particle; of a batch of recorded steps
-    ``running``, 0 when the rest is not to be taken, and ``taken``, steps so far.
+    strain that asks for as short a step, ``frequency`` [1/s] what a condition asks for (``Bound.limit``) and ``added``
+    [1/s²] the sum of all their (½ frequency)², ``bad`` place of the first unphysical particle; of a batch of recorded
+    steps ``running``, 0 when the rest is not to be taken, and ``taken``, steps so far.
     """
 
     @wp.struct
@@ -152,6 +161,8 @@ def clock_structure(space: Space) -> Any:
         longest_dt: wp.array(dtype=wp.float64)
         target: wp.array(dtype=wp.float64)
         rate: wp.array(dtype=space.real)
+        frequency: wp.array(dtype=space.real)
+        added: wp.array(dtype=wp.float64)
         bad: wp.array(dtype=wp.int32)
         running: wp.array(dtype=wp.int32)
         taken: wp.array(dtype=wp.int32)

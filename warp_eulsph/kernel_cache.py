@@ -43,7 +43,7 @@ def _rebuilding(load: Any) -> Any:
             _remove(kept)
         return load(module, device, block_dim, *more, **options)
 
-    rebuilding.rebuilds = True
+    rebuilding.rebuilds = True  # type: ignore[attr-defined]
     return rebuilding
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .summary import Rows, as_html, as_text, extent
+from .turns import in_turn
 
 if TYPE_CHECKING:
     from .order import Order
@@ -14,16 +15,39 @@ if TYPE_CHECKING:
 ALL_FORCES = ("internal", "correction", "tie", "dissipation", "external", "reaction")
 
 
+@in_turn()
 class Looks:
     """Fields of a ``Simulation`` in the order of the bodies' particles, copies on the host, and how it is shown."""
 
     bodies: list[Any]
     boundaries: tuple[Any, ...]
+    interactions: tuple[Any, ...]
     space: "Space"
     order: "Order"
     device: Any
     stepper: Any
     particles: Any
+
+    if TYPE_CHECKING:
+
+        @property
+        def t(self) -> float: ...
+
+        @property
+        def dt(self) -> float: ...
+
+        @property
+        def steps(self) -> int: ...
+
+        @property
+        def x(self) -> np.ndarray: ...
+
+        @property
+        def F(self) -> np.ndarray: ...
+
+        def extrema(self) -> dict[str, float]: ...
+
+        def energy(self) -> dict[str, float]: ...
 
     @property
     def X(self) -> np.ndarray:
@@ -49,10 +73,9 @@ class Looks:
 
         F is the one the material carries: of a liquid its volume only.
         """
-        from .output.tensors import padded
+        from .output.tensors import first_piola
 
-        F = padded(self.F, 1.0)
-        return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)
+        return first_piola(self.cauchy_stress, self.F)
 
     @property
     def strain_energy_density(self) -> np.ndarray:
@@ -81,6 +104,7 @@ class Looks:
         return f"Simulation: {particles}, {dim}-D, {self.space.real.__name__} on {self.device}", [
             ("bodies", names),
             ("conditions", conditions),
+            ("interactions", ", ".join(type(each).__name__ for each in self.interactions) or "none"),
             ("time", f"{self.t:.6g} s, step {self.steps}, last one {self.dt:.4g} s"),
             ("extent", extent(self.x)),
             ("volume ratio", f"{extrema['least J']:.4g} … {extrema['largest J']:.4g}"),

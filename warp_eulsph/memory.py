@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
         field for group, fields in GROUPS.items() for name, field in fields.items() if f"{group}.{name}" not in absent
     ]
     reals = sum(sizes[field.kind] for field in present) + 2 * d + d * d + d * d + d  # the half step, ∇v, old v
-    ints, doubles = 4, 2 + 2 * 7 / 64  # body, number, start, poor; energies, blocks of the books
+    ints, doubles = 5, 2 + 2 * 7 / 64  # body, group, number, start, poor; energies, blocks of the books
     if vectors:
         reals += LANES * (3 + 2 * d)
     if not moving:
@@ -107,13 +108,18 @@ def check_room(count: float, reals: float, who: str) -> None:
         )
 
 
-def check_memory(space: Space, n: int, reach: float, moving: bool, device: Any) -> None:
-    """Log what ``n`` particles will take; raise MemoryError if that is more than there is."""
-    each, there = bytes_per_particle(space, reach, moving, device, n), available(device)
-    log.info("%d particles take about %.0f bytes each, %.3g MB", n, each, n * each / 1e6)
-    if there is not None and n * each > there:
+def check_memory(space: Space, media: Sequence[tuple[int, float, bool]], device: Any) -> None:
+    """Log what media will take; raise MemoryError if that is more than there is.
+
+    Args:
+        media: particles, support radius in spacings, and whether an arrangement moves, of each.
+    """
+    n, there = sum(count for count, _, _ in media), available(device)
+    taken = sum(count * bytes_per_particle(space, reach, moving, device, count) for count, reach, moving in media)
+    log.info("%d particles take about %.0f bytes each, %.3g MB", n, taken / n, taken / 1e6)
+    if there is not None and taken > there:
         raise MemoryError(
-            f"{n} particles take about {each:.0f} bytes each, {n * each / 1e9:.3g} GB, and {there / 1e9:.3g} GB are "
+            f"{n} particles take about {taken / n:.0f} bytes each, {taken / 1e9:.3g} GB, and {there / 1e9:.3g} GB are "
             "available; use fewer particles, float32, or a smaller dilation"
         )
 

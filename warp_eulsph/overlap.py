@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .body import Body
+from .body import Body, groups_of
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +43,8 @@ class Encounters:
         self._matter = [(numbers, spacing[numbers]) for numbers in matter]
         self._box = np.array(box, dtype=float)
         self._shifts = np.array(list(product(*[(-length, 0.0, length) if length > 0.0 else (0.0,) for length in box])))
-        self._left = [(i, j) for i, j in combinations(range(len(bodies)), 2) if len(matter[i]) and len(matter[j])]
+        groups, pairs = groups_of(bodies), combinations(range(len(bodies)), 2)
+        self._left = [(i, j) for i, j in pairs if groups[i] != groups[j] and len(matter[i]) and len(matter[j])]
         self._looked, self._due, self._rest = 0, 0.0, 0.0  # step, time [s], the clock on the wall [s]
 
     def look(self, x: np.ndarray, t: float, step: int, speed: float = math.inf) -> list[str]:
@@ -68,7 +69,8 @@ class Encounters:
                 names = [f"{near.sum()} particles of {self.names[k]!r}" for k, near in zip((i, j), within, strict=True)]
                 lines.append(
                     f"bodies {self.names[i]!r} and {self.names[j]!r} overlap or touch{when}: {' and '.join(names)} lie "
-                    f"within {TOUCHING} spacings of one of the other; bodies do not feel each other, they pass through"
+                    f"within {TOUCHING} spacings of one of the other; bodies do not feel each other, they pass through,"
+                    " unless bonded=... makes them one or an interaction acts between them"
                 )
         if gap == 0.0 and start >= self._rest:
             end = time.perf_counter()

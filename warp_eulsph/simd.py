@@ -147,3 +147,23 @@ BY_TWO = """
         two(index.data[k], last ? a : index.data[k + 1], both((Q)w.data[k], last ? (Q)0 : (Q)w.data[k + 1]), 0);
     }
 """
+
+#: The same for tilted weights (M17) of the other ends, 2 w − own; expects ``own`` too.
+BY_TWO_DUAL = """
+    int k = begin;
+    for (; k + 8 <= end; k += 8) {
+        V eight_w, eight_own;
+        __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
+        __builtin_memcpy(&eight_own, own.data + k, sizeof(V));
+        eight_w += eight_w - eight_own;
+        const int* const b = index.data + k;
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) two(b[i], b[i + 4], spread(eight_w, i), i);
+    }
+    for (; k < end; k += 2) {
+        const bool last = k + 1 == end;
+        const int next = last ? k : k + 1;
+        const T one = w.data[k] + (w.data[k] - own.data[k]), other = w.data[next] + (w.data[next] - own.data[next]);
+        two(index.data[k], last ? a : index.data[next], both((Q)one, last ? (Q)0 : (Q)other), 0);
+    }
+"""

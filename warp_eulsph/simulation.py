@@ -14,6 +14,7 @@ from .checks import check_restorable, checked_box, objects, real_number, whole_n
 from .diagnostics import Diagnostics
 from .execution import graphs
 from .failure import failure
+from .interactions import Interaction
 from .looks import Looks
 from .memory import check_memory
 from .order import Order
@@ -31,6 +32,7 @@ from .scheme.verlet import Verlet
 from .scheme.world import Parts
 from .sorting import Sorting
 from .space import Space
+from .turns import in_turn
 from .weights import CubicSpline, Weight
 from .whole import Whole
 
@@ -38,13 +40,16 @@ from .whole import Whole
 STEPS_BETWEEN_LOOKS = 8
 
 
+@in_turn("run", "frames", "step", "advance")
 class Simulation(Looks):
     """Runs bodies under conditions with one scheme.
 
     Args:
         bodies: one or several ``Body``; particles of different bodies are never neighbours.
         boundaries: conditions, imposed in this order.
-        reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian.
+        interactions: forces between bodies, or between bodies and what moves beside them.
+        reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian. This,
+            arrangement, scheme, weight and dilation are those of bodies that have none of their own; the step is one.
         arrangement: which bodies a refresh reads anew from their positions: Convected() those that flow, Current() all.
         scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax.
         time_step: TimeStep options.
@@ -67,6 +72,7 @@ class Simulation(Looks):
         bodies: Body | Sequence[Body],
         *,
         boundaries: Sequence[Boundary] = (),
+        interactions: Sequence[Interaction] = (),
         reference: ReferencePolicy = Always(),
         arrangement: Arrangement = Convected(),
         scheme: Scheme = Verlet(),
@@ -84,17 +90,19 @@ class Simulation(Looks):
         self.space = Space(X.shape[1], dtype, periodic is not None)
         self.device = wp.get_device(device)
         self.boundaries = tuple(objects(boundaries, Boundary, "boundaries", "Fixed(lambda X: X[:, 0] < 0.1)"))
+        self.interactions = tuple(objects(interactions, Interaction, "interactions", "an Interaction"))
         self.reference, self.arrangement, self.dilation = reference, arrangement, dilation
         box = checked_box(periodic, self.space.dim)
-        media = plan_media(self.bodies, Options(reference, arrangement, scheme, weight, dilation))
-        for each in media:
-            check_memory(self.space, each.n, each.reach, each.moves, self.device)
+        self.options = Options(reference, arrangement, scheme, weight, dilation)
+        media = plan_media(self.bodies, self.options)
+        check_memory(self.space, [(each.n, each.reach, each.moves) for each in media], self.device)
         self.ranges = ranges_of(self.bodies)
         self.particles = make_particles(self.space, media, self.device)
         self.order = Order(len(X), self.device)
         surface_given = self.bodies[0].surface is not None
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order, surface_given)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
+        self.bound_interactions = [interaction.bind(assembly) for interaction in self.interactions]
         self.encounters = Encounters(self.bodies, self.particles.share.numpy() == 0.0, box)
         warn(self.bodies, self.encounters, self.space.real)
         self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
@@ -105,6 +113,7 @@ class Simulation(Looks):
                 particles=self.particles,
                 media=[each.build(self.space, self.particles, box, self.device) for each in media],
                 conditions=self.conditions,
+                interactions=self.bound_interactions,
                 clock=self.clock,
             )
         )
@@ -264,8 +273,8 @@ class Simulation(Looks):
 
     @property
     def configuration(self) -> Configuration:
-        """The configuration in which weights live now."""
-        return self.stepper.configuration
+        """The configuration in which weights live now, of the first medium; ``stepper.media`` has all."""
+        return self.stepper.media[0].configuration
 
     @property
     def x(self) -> np.ndarray:
@@ -291,22 +300,26 @@ class Simulation(Looks):
         """Least and largest volume ratio det F [-], largest speed [m/s] and largest mismatch [spacings]."""
         U = self.stepper.U
         found = dict(zip(("least J", "largest J", "speed"), self.diagnostics.extrema(U), strict=True))
-        return found | {"mismatch": self.diagnostics.mismatch(self.configuration, U)[1]}
+        return found | {"mismatch": self.diagnostics.mismatch(self.stepper.media, U)[1]}
 
     @property
     def mismatch(self) -> np.ndarray:
         """How far positions and F disagree around each particle [spacings], rms of r_ab of its pairs (M16), (n,)."""
-        return self.order.by_number(self.diagnostics.mismatch(self.configuration, self.stepper.U)[0].numpy())
+        return self.order.by_number(self.diagnostics.mismatch(self.stepper.media, self.stepper.U)[0].numpy())
 
     def energy(self) -> dict[str, float]:
-        """Energies [J]: kinetic, stored in strain, in the tie (M16), total, what each mechanism added, the residual."""
+        """Energies [J]: kinetic, stored in strain, in the tie (M16), total, what each mechanism added, the residual.
+
+        Where there are interactions also ``held``, what they hold, and ``interaction``, what they added or dissipated.
+        """
         U, ledger = self.stepper.U, self.stepper.ledger
-        kinetic, stored = ledger.kinetic(U), ledger.stored(U)
+        parts = {"kinetic": ledger.kinetic(U), "stored": ledger.stored(U)}
         accounts = ledger.accounts()
-        tied = -accounts.pop("tie")
-        total = kinetic + stored + tied
-        residual = total - ledger.start - sum(accounts.values())
-        return {"kinetic": kinetic, "stored": stored, "tied": tied, "total": total, **accounts, "residual": residual}
+        parts["tied"] = -accounts.pop("tie")
+        if self.interactions:
+            parts["held"] = ledger.held()
+        total = sum(parts.values())
+        return {**parts, "total": total, **accounts, "residual": total - ledger.start - sum(accounts.values())}
 
     def momentum(self) -> np.ndarray:
         """Linear momentum [kg m/s], (dim,)."""

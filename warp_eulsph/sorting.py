@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from .boundaries import Bound
 from .fields import structure
+from .interactions import BoundInteraction
 from .order import Order, spatial_order
+from .reduce import SumOfParticles
 from .scheme.medium import Medium
 from .scheme.reference import reference_spacing
 from .scheme.stepper import Stepper
@@ -30,7 +33,7 @@ SHORT_ROWS = 0.25
 
 @functools.cache
 def _make_count_parted(space: Space) -> Any:
-    """Kernel: how many particles are far from the one before them, if it is of the same body."""
+    """Kernel of ``SumOfParticles``: how many particles are far from the one before them, if it is of the same body."""
     real, vec, separation = space.real, space.vec, difference(space)
     Particles, Reference, spacing_of = (
         structure(space, "Particles"),
@@ -40,21 +43,46 @@ def _make_count_parted(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def count_parted(
+        first: int,
+        n: int,
+        each: int,
         places: wp.array(dtype=wp.int32),
         particles: Particles,
         reference: Reference,
         box: vec,
-        count: wp.array(dtype=wp.int32),
+        out: wp.array(dtype=wp.int32),
     ):
-        i = wp.tid()
-        a = places[i]
-        b = places[i + 1]
-        spacing = spacing_of(a, particles, reference)
-        far = wp.length(separation(reference.x[b], reference.x[a], box)) > real(APART) * spacing
-        if far and particles.body[a] == particles.body[b]:
-            wp.atomic_add(count, 0, 1)
+        block = first + wp.tid()
+        count = int(0)
+        for i in range(block * each, wp.min((block + 1) * each, n)):
+            a = places[i]
+            b = places[i + 1]
+            spacing = spacing_of(a, particles, reference)
+            far = wp.length(separation(reference.x[b], reference.x[a], box)) > real(APART) * spacing
+            if far and particles.body[a] == particles.body[b]:
+                count += 1
+        out[block] = count
 
     return count_parted
+
+
+class _CountParted:
+    """Counts the parted particles of one medium."""
+
+    def __init__(self, medium: Medium):
+        self.medium, device = medium, medium.device
+        self._places, self._count = (wp.zeros(k, dtype=wp.int32, device=device) for k in (medium.n, 1))
+        self._sum = SumOfParticles(wp.int32, medium.n - 1, device)
+
+    def __call__(self, places: np.ndarray | None) -> int:
+        """How many there are, or were they at these places of the world, (n,); reads the device."""
+        medium, span = self.medium, self.medium.span
+        chosen = np.arange(medium.n) if places is None else places[span.start : span.stop] - span.start
+        self._places.assign(chosen.astype(np.int32))
+        configuration = medium.configuration
+        arguments = [self._places, medium.particles, configuration.fields, configuration.lists.box]
+        self._sum(_make_count_parted(medium.space), arguments, self._count)
+        return int(self._count.numpy()[0])
 
 
 class Sorting:
@@ -73,10 +101,11 @@ class Sorting:
     def __init__(self, stepper: Stepper, order: Order, on: bool):
         self.stepper, self.order = stepper, order
         self.space, self.device = stepper.space, stepper.device
-        self.on = on and all(condition.sortable for condition in stepper.conditions)
+        self._parts: list[Bound | BoundInteraction] = [*stepper.conditions, *stepper.interactions]
+        self.on = on and all(part.sortable for part in self._parts)
         if on and not self.on:
-            log.info("particles are not sorted in memory: a condition does not say that it is sortable")
-        self._count = wp.zeros(1, dtype=wp.int32, device=self.device)
+            log.info("particles are not sorted in memory: a condition or interaction does not say that it is sortable")
+        self._counts = [_CountParted(medium) for medium in stepper.media]
         self._in_order = SHORT_ROWS
         if self.on:
             self.look()
@@ -107,14 +136,7 @@ class Sorting:
     def parted(self, places: np.ndarray | None = None) -> float:
         """Share of the particles that are far from the one before them, in memory or were they at these places, (n,),
         instead; reads the device."""
-        self._count.zero_()
-        for medium in self.stepper.media:
-            span, configuration = medium.span, medium.configuration
-            chosen = np.arange(medium.n) if places is None else places[span.start : span.stop] - span.start
-            arguments = [wp.array(chosen, dtype=wp.int32, device=self.device), medium.particles, configuration.fields]
-            arguments += [configuration.lists.box, self._count]
-            wp.launch(_make_count_parted(self.space), medium.n - 1, arguments, device=self.device)
-        return int(self._count.numpy()[0]) / self.stepper.n
+        return sum(count(places) for count in self._counts) / self.stepper.n
 
     def permute(self, places: np.ndarray) -> None:
         """Move the particles at these places, (n,), to the places 0, 1, …, each body within its range.
@@ -147,7 +169,7 @@ class Sorting:
     def _arrays(self) -> Iterator[tuple[wp.array, range]]:
         """What evolves and has an element for each particle, and the particles that each array is of."""
         stepper = self.stepper
-        own = {id(array) for condition in stepper.conditions for array in condition.evolving().values()}
+        own = {id(array) for part in self._parts for array in part.evolving().values()}
         spans: dict[int, range] = {}
         for medium in stepper.media:
             first = medium.span.start
@@ -156,5 +178,5 @@ class Sorting:
                 spans[id(history)] = range(first + body.start, first + body.stop)
         for array in stepper.evolving().values():
             span = spans.get(id(array), range(stepper.n))
-            if len(array) == len(span) and id(array) not in own:  # those of conditions go by number
+            if len(array) == len(span) and id(array) not in own:  # theirs go by number
                 yield array, span

@@ -14,12 +14,14 @@ from .scheme.health import UnstableError, last_good
 from .scheme.reference import Configuration
 from .scheme.scalar import ConservationLaw
 from .simulation import STEPS_BETWEEN_LOOKS
+from .turns import in_turn
 from .whole import Whole
 
 # Values that grew to so many times the largest at the start: nothing that is only carried along does that.
 GROWN = 100.0
 
 
+@in_turn("advance")
 class Transport:
     """Runs a scalar conservation law in steps of one length; ``output.record`` takes it as it takes a ``Simulation``.
 

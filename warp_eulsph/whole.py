@@ -5,6 +5,10 @@ import threading
 from types import FrameType, TracebackType
 from typing import Any
 
+import warp as wp
+
+from .turns import turn
+
 
 class BrokenError(RuntimeError):
     """A simulation is asked to go on from the middle of a step, which something broke into."""
@@ -14,7 +18,7 @@ class Whole:
     """Guards what must not be left half done: ``with whole: step()``.
 
     SIGINT (Ctrl-C) is held back until the end, in the main thread; a second one breaks in at once. After any exception
-    in between, ``check`` raises until ``mend`` says that all is as it should be.
+    in between, ``check`` raises until ``mend`` says that all is as it should be. Simulations in other threads wait.
 
     Attributes:
         broken: what broke in, None while all is well.
@@ -42,6 +46,12 @@ class Whole:
         self.broken = None
 
     def __enter__(self) -> None:
+        if taped():
+            raise RuntimeError(
+                "a step must not be taken within a tape, got a wp.Tape that records: kernels have no backward pass, so "
+                "that gradients would be zero; leave the tape, and take derivatives by differences of runs"
+            )
+        turn.__enter__()
         if threading.current_thread() is not threading.main_thread():
             return
         before = signal.getsignal(signal.SIGINT)
@@ -52,6 +62,7 @@ class Whole:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         if kind is not None:
             self.broken = f"{kind.__name__}: {error}" if str(error) else kind.__name__
+        turn.__exit__()
         if self._before is not None:
             self._release()
 
@@ -67,3 +78,8 @@ class Whole:
         held, self._held = self._held, 0
         for _ in range(held):
             signal.raise_signal(signal.SIGINT)
+
+
+def taped() -> bool:
+    """Whether a ``wp.Tape`` is recording, which Warp has no public way to ask."""
+    return wp._src.context.runtime.tape is not None

@@ -3,6 +3,7 @@
 from .base import Assembly, Bound, Boundary, Region
 from .body_force import BodyForce
 from .clamped import Clamped
+from .damping import Damping
 from .gravity import Gravity
 from .mirror import Antisymmetry, MirrorGhosts, Wall, mirror
 from .motion import Motion
@@ -18,6 +19,7 @@ __all__ = [
     "Bound",
     "Boundary",
     "Clamped",
+    "Damping",
     "Fixed",
     "Gravity",
     "MirrorGhosts",

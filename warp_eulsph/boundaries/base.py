@@ -142,7 +142,8 @@ class Bound:
 
     Attributes:
         indices: numbers of the particles it acts on, (k,) int32.
-        recordable: whether ``impose`` and ``load`` launch kernels and nothing else, so that a graph can repeat them.
+        recordable: whether ``impose``, ``load`` and ``limit`` launch kernels and nothing else, so that a graph can
+            repeat them.
         sortable: whether particles may be sorted in memory: it finds them by arrays of ``Assembly.order.places_of``,
             what it holds for all of them comes from ``Assembly.order.carry``, the rest goes by ``indices``.
     """
@@ -157,9 +158,19 @@ class Bound:
         return type(self).load is not Bound.load
 
     @property
+    def damps(self) -> bool:
+        """Whether ``damp`` adds forces."""
+        return type(self).damp is not Bound.damp
+
+    @property
     def reads_surface(self) -> bool:
         """Whether ``load`` reads ``state.surface``; where the reference is fixed they move for those that do."""
         return self.loads
+
+    @property
+    def limits(self) -> bool:
+        """Whether ``limit`` asks for a shorter step."""
+        return type(self).limit is not Bound.limit
 
     def start(self, state: Any) -> None:
         """Prepare from the initial state, surface vectors included; called once."""
@@ -169,6 +180,16 @@ class Bound:
 
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         """Add forces [N] at time t + fraction · Δt to ``external``."""
+
+    def damp(self, state: Any, clock: Any, forces: Any) -> None:
+        """Add forces [N] that damp motion to both ``forces.external`` and ``forces.damping``; comes after ``load``."""
+
+    def limit(self, state: Any, clock: Any) -> None:
+        """Ask for a shorter step, before it is chosen, for what ``load`` may do in it.
+
+        Raise ``clock.frequency[0]`` to the highest angular frequency [1/s] of a particle under these forces alone:
+        √(k/m) for a stiffness k [N/m], a damper's rate c/m. It counts whether they act now or begin to in the step.
+        """
 
     def evolving(self) -> dict[str, wp.array]:
         """Arrays by name that a step reads before it writes them: what a checkpoint must hold of the condition."""

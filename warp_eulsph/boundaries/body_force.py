@@ -6,6 +6,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..space import Space
 from .base import Assembly, Bound, Boundary, Region
 from .value import Value
@@ -37,12 +38,13 @@ def _make_load(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def load(
+        first: int,
         indices: wp.array(dtype=wp.int32),
         values: wp.array(dtype=vec),
         mass: wp.array(dtype=real),
         external: wp.array(dtype=vec),
     ):
-        k = wp.tid()
+        k = first + wp.tid()
         a = indices[k]
         external[a] = external[a] + values[k] * mass[a]
 
@@ -58,6 +60,7 @@ class BoundBodyForce(Bound):
     def __init__(self, condition: BodyForce, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device, self.mass = assembly.space, assembly.device, assembly.particles.mass
+        self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
         self.recordable = self.values.recordable
@@ -68,4 +71,4 @@ class BoundBodyForce(Bound):
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x if self.X is None else self.X, clock, fraction)
         arguments = [self.values.places, values, self.mass, external]
-        wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)
+        self._launch(_make_load(self.space), len(self.indices), arguments)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher
 from ..space import Space
 from .base import Assembly, Bound, Boundary, Region, unit_vector
 from .face import faces_along
@@ -55,13 +56,14 @@ def _make_hold(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def hold(
+        first: int,
         start: wp.array(dtype=wp.int32),
         indices: wp.array(dtype=wp.int32),
         weights: wp.array(dtype=real),
         mass: wp.array(dtype=real),
         v: wp.array(dtype=vec),
     ):
-        column = wp.tid()
+        column = first + wp.tid()
         moves, square = vec(), real(0.0)
         for k in range(start[column], start[column + 1]):
             a = indices[k]
@@ -83,6 +85,7 @@ class BoundClamped(Bound):
     def __init__(self, condition: Clamped, assembly: Assembly):
         self.condition, self.assembly = condition, assembly
         self.space, self.device, self.mass = assembly.space, assembly.device, assembly.particles.mass
+        self._launch = Launcher(assembly.device)
         dim = self.space.dim
         self.normal = unit_vector(condition.normal, dim, "Clamped")
         point = np.asarray(condition.point, dtype=float)
@@ -127,7 +130,7 @@ class BoundClamped(Bound):
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         if self._start is not None:  # initial velocities are imposed before area vectors are known, and again after
             arguments = [self._start, self._places, self._weights, self.mass, state.v]
-            wp.launch(_make_hold(self.space), len(self._start) - 1, arguments, device=self.device)
+            self._launch(_make_hold(self.space), len(self._start) - 1, arguments)
 
 
 def _positive(columns: np.ndarray, areas: np.ndarray, top: np.ndarray, count: int) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from ..checks import real_array
+from ..execution import Launcher
 from ..fields import structure
 from ..space import Space
 from .base import Assembly, Bound, Boundary, unit_vector
@@ -67,8 +68,9 @@ def mirror(
 ) -> tuple[Any, MirrorGhosts]:
     """The body with ghosts behind a plane, and the condition that moves them.
 
-    Ghosts are ordinary particles. Those next to the plane need all of their own neighbours, so take ``depth`` = two
-    support radii = 2 · weight.support · dilation · spacing. Two planes: mirror the result again; ghosts of ghosts fill
+    Ghosts are ordinary particles. Those next to the plane need all of their own neighbours, and these theirs, so take
+    ``depth`` = three support radii = 3 · weight.support · dilation · spacing; two are enough where the arrangement is
+    read anew, or dissipation switched off. Two planes: mirror the result again; ghosts of ghosts fill
     the corner.
 
     Args:
@@ -128,6 +130,7 @@ def _make_reflect(space: Space, odd: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def reflect(
+        first: int,
         sources: wp.array(dtype=wp.int32),
         ghosts: wp.array(dtype=wp.int32),
         X: wp.array(dtype=vec),
@@ -135,7 +138,7 @@ def _make_reflect(space: Space, odd: bool) -> Any:
         normal: vec,
         state: State,
     ):
-        k = wp.tid()
+        k = first + wp.tid()
         a = sources[k]
         g = ghosts[k]
         unit = wp.identity(n=wp.static(space.dim), dtype=real)
@@ -160,6 +163,7 @@ class BoundMirrorGhosts(Bound):
 
     def __init__(self, condition: MirrorGhosts, assembly: Assembly):
         self.space, self.device, self.image = assembly.space, assembly.device, condition.image
+        self._launch = Launcher(assembly.device)
         first = assembly.bodies[condition.body][0] if condition.body in assembly.bodies else 0
         self.indices = assembly.select(first + condition.ghosts, condition.body, "MirrorGhosts")
         sources = (first + condition.sources).astype(np.int32)
@@ -172,4 +176,4 @@ class BoundMirrorGhosts(Bound):
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         arguments = [self._sources, self._ghosts, self._X, *self._plane, state]
-        wp.launch(_make_reflect(self.space, self.image.odd), len(self.indices), arguments, device=self.device)
+        self._launch(_make_reflect(self.space, self.image.odd), len(self.indices), arguments)

@@ -7,6 +7,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
 from .base import Assembly, Bound, Boundary, Region
@@ -42,13 +43,14 @@ def _make_impose(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def impose(
+        first: int,
         indices: wp.array(dtype=wp.int32),
         before: wp.array(dtype=vec),
         after: wp.array(dtype=vec),
         clock: Clock,
         v: wp.array(dtype=vec),
     ):
-        k = wp.tid()
+        k = first + wp.tid()
         if clock.dt[0] > wp.float64(0.0):
             v[indices[k]] = (after[k] - before[k]) / real(clock.dt[0])
 
@@ -68,6 +70,7 @@ class BoundMotion(Bound):
                 f"{type(condition.displacement).__name__}; Fixed() holds particles in place"
             )
         self.space, self.device = assembly.space, assembly.device
+        self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.X = assembly.order.carry(assembly.X, self.space.vec)
         self.before, self.after = (
@@ -79,4 +82,4 @@ class BoundMotion(Bound):
         before = self.before.at(self.X, clock, fraction - 0.5)
         after = self.after.at(self.X, clock, fraction + 0.5)
         arguments = [self.before.places, before, after, clock, state.v]
-        wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)
+        self._launch(_make_impose(self.space), len(self.indices), arguments)

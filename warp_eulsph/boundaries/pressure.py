@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import structure
 from ..linalg import cofactor
 from ..space import Space
@@ -53,9 +54,13 @@ def _make_load(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def load(
-        indices: wp.array(dtype=wp.int32), values: wp.array(dtype=one), state: State, external: wp.array(dtype=vec)
+        first: int,
+        indices: wp.array(dtype=wp.int32),
+        values: wp.array(dtype=one),
+        state: State,
+        external: wp.array(dtype=vec),
     ):
-        k = wp.tid()
+        k = first + wp.tid()
         a = indices[k]
         external[a] = external[a] - state.surface[a] * values[k][0]
 
@@ -69,6 +74,7 @@ def _make_load_face(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def load_face(
+        first: int,
         indices: wp.array(dtype=wp.int32),
         rows: wp.array(dtype=wp.int32),
         values: wp.array(dtype=one),
@@ -77,7 +83,7 @@ def _make_load_face(space: Space) -> Any:
         state: State,
         external: wp.array(dtype=vec),
     ):
-        k = wp.tid()
+        k = first + wp.tid()
         a = indices[k]
         area = state.surface[a] * shares[k] + cof(state.F[a]) @ rests[k]
         external[a] = external[a] - area * values[rows[k]][0]
@@ -93,6 +99,7 @@ class BoundPressure(Bound):
     def __init__(self, condition: Pressure, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device
+        self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, 1, condition.value, who)
         self.recordable = self.values.recordable
@@ -100,7 +107,7 @@ class BoundPressure(Bound):
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self.values.places, values, state, external]
-        wp.launch(_make_load(self.space), len(self.indices), arguments, device=self.device)
+        self._launch(_make_load(self.space), len(self.indices), arguments)
 
 
 class BoundFacePressure(BoundPressure):
@@ -143,4 +150,4 @@ class BoundFacePressure(BoundPressure):
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self._places, self._rows, values, self._shares, self._rests, state, external]
-        wp.launch(_make_load_face(self.space), len(self.members), arguments, device=self.device)
+        self._launch(_make_load_face(self.space), len(self.members), arguments)

@@ -7,6 +7,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..space import Space
 from .base import Assembly, Bound, Boundary, Region, unit_vector
 
@@ -34,8 +35,8 @@ def _make_impose(space: Space) -> Any:
     vec = space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
-    def impose(indices: wp.array(dtype=wp.int32), normal: vec, v: wp.array(dtype=vec)):
-        a = indices[wp.tid()]
+    def impose(first: int, indices: wp.array(dtype=wp.int32), normal: vec, v: wp.array(dtype=vec)):
+        a = indices[first + wp.tid()]
         v[a] = v[a] - normal * wp.dot(normal, v[a])
 
     return impose
@@ -50,10 +51,11 @@ class BoundRoller(Bound):
     def __init__(self, condition: Roller, assembly: Assembly):
         who = type(condition).__name__
         self.space, self.device = assembly.space, assembly.device
+        self._launch = Launcher(assembly.device)
         self.normal = unit_vector(condition.normal, self.space.dim, who)
         self.indices = assembly.select(condition.region, condition.body, who)
         self._places = assembly.order.places_of(self.indices)
 
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         arguments = [self._places, self.space.vec(*self.normal), state.v]
-        wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)
+        self._launch(_make_impose(self.space), len(self.indices), arguments)

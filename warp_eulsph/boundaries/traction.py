@@ -7,6 +7,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..space import Space
 from .base import Assembly, Bound, Boundary, Region, rows_of, unit_vector
 from .face import faces_along
@@ -48,13 +49,14 @@ def _make_load(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def load(
+        first: int,
         indices: wp.array(dtype=wp.int32),
         rows: wp.array(dtype=wp.int32),
         values: wp.array(dtype=vec),
         areas: wp.array(dtype=real),
         external: wp.array(dtype=vec),
     ):
-        k = wp.tid()
+        k = first + wp.tid()
         a = indices[k]
         external[a] = external[a] + values[rows[k]] * areas[k]
 
@@ -75,6 +77,7 @@ class BoundTraction(Bound):
         who = type(condition).__name__
         self.condition, self.assembly = condition, assembly
         self.space, self.device = assembly.space, assembly.device
+        self._launch = Launcher(assembly.device)
         self.normal = unit_vector(condition.normal, self.space.dim, who)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
@@ -90,4 +93,4 @@ class BoundTraction(Bound):
     def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self._places, self._rows, values, self._areas, external]
-        wp.launch(_make_load(self.space), len(self._places), arguments, device=self.device)
+        self._launch(_make_load(self.space), len(self._places), arguments)

@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 
 from ..checks import real_array, spread
+from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
 from .base import Assembly, check_takes, read_only
@@ -19,13 +20,14 @@ def _make_evaluate(space: Space, components: int, function: Any) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def evaluate(
+        first: int,
         indices: wp.array(dtype=wp.int32),
         x: wp.array(dtype=vec),
         clock: Clock,
         fraction: wp.float64,
         out: wp.array(dtype=value),
     ):
-        k = wp.tid()
+        k = first + wp.tid()
         t = clock.t[0] + fraction * clock.dt[0]
         out[k] = value(function(x[indices[k]], real(t)))
 
@@ -51,7 +53,7 @@ class Value:
 
     def __init__(self, assembly: Assembly, indices: np.ndarray, components: int, given: Any, who: str):
         self.space, self.device, self.components, self.who = assembly.space, assembly.device, components, who
-        self.count = len(indices)
+        self.count, self._launch = len(indices), Launcher(assembly.device)
         self.places = assembly.order.places_of(indices)
         self.rows = wp.zeros(len(indices), dtype=self.space.row(components), device=assembly.device)
         self.function = given if callable(given) else None
@@ -73,7 +75,7 @@ class Value:
         """The rows at positions ``x`` [m] and time t + fraction · Δt, (k,)."""
         if self.on_device:
             kernel = _make_evaluate(self.space, self.components, self.function)
-            wp.launch(kernel, len(self.places), [self.places, x, clock, fraction, self.rows], device=self.device)
+            self._launch(kernel, len(self.places), [self.places, x, clock, fraction, self.rows])
         elif self.function is not None:
             t = float(clock.t.numpy()[0]) + fraction * float(clock.dt.numpy()[0])
             self.rows.assign(self._broadcast(self.function(read_only(x.numpy()[self.places.numpy()]), t)))

@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..space import Space
 from .base import Assembly, Bound, Boundary, Region
 from .value import Value
@@ -38,8 +39,14 @@ def _make_impose(space: Space) -> Any:
     vec, dim = space.vec, space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
-    def impose(indices: wp.array(dtype=wp.int32), values: wp.array(dtype=vec), axes: wp.vec3i, v: wp.array(dtype=vec)):
-        k = wp.tid()
+    def impose(
+        first: int,
+        indices: wp.array(dtype=wp.int32),
+        values: wp.array(dtype=vec),
+        axes: wp.vec3i,
+        v: wp.array(dtype=vec),
+    ):
+        k = first + wp.tid()
         v_a = v[indices[k]]
         for i in range(wp.static(dim)):
             if axes[i] != 0:
@@ -56,6 +63,7 @@ class BoundVelocity(Bound):
 
     def __init__(self, condition: Velocity, assembly: Assembly, who: str):
         self.space, self.device = assembly.space, assembly.device
+        self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
         self.recordable = self.values.recordable
@@ -70,7 +78,7 @@ class BoundVelocity(Bound):
     def impose(self, state: Any, clock: Any, fraction: float) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self.values.places, values, self.axes, state.v]
-        wp.launch(_make_impose(self.space), len(self.indices), arguments, device=self.device)
+        self._launch(_make_impose(self.space), len(self.indices), arguments)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,18 +8,24 @@ from pydantic import Field, model_validator
 
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
+from ..building import Options, options_of
+from ..interactions import Interaction
 from ..materials import Material
-from ..output import FIELDS, Probe
+from ..output import DEFAULT_FIELDS, FIELDS, Probe
 from ..scheme.arrangement import Arrangement
 from ..scheme.base import Scheme
 from ..scheme.policy import ReferencePolicy
 from ..scheme.time_step import TimeStep
 from ..simulation import Body, Simulation
+from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, choice, one_of
+from .options import Table, choice, one_of, open_choice, own_choice
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
-from .values import Formula, Number, PlaceFormula
+from .values import Formula, Number, PlaceFormula, ZoneFormula
+
+#: What a body may have of its own.
+OWN = "of this body; that of the case where it is left out"
 
 
 class MirrorPlane(Table):
@@ -27,7 +33,9 @@ class MirrorPlane(Table):
 
     point: list[Number] = Field(description="a point of the plane [m], (dim,)")
     normal: list[Number] = Field(description="normal of the plane, out of the body, (dim,)")
-    depth: Number | None = Field(None, description="particles this near get a ghost [m]; two support radii by default")
+    depth: Number | None = Field(
+        None, description="particles this near get a ghost [m]; three support radii by default"
+    )
     image: choice(Image) = Field("Wall", validate_default=True, description="Wall, or Antisymmetry for a linear law")  # type: ignore[valid-type]
 
 
@@ -35,8 +43,9 @@ class BodyTable(Table):
     """A solid: a shape filled with particles, its material, and how it starts."""
 
     shape: one_of(*SHAPES) = Field(description="a function of warp_eulsph.geometry")  # type: ignore[valid-type]
-    material: choice(Material)  # type: ignore[valid-type]
+    material: open_choice(Material)  # type: ignore[valid-type]
     velocity: PlaceFormula = Field(0.0, validate_default=True, description="initial velocity [m/s]")
+    cut: ZoneFormula | None = Field(None, description="which particles of the shape are left out, such as a notch")
     volume: PlaceFormula | None = Field(None, description="volumes [m^dim] instead of those of the shape")
     spacing: PlaceFormula | None = Field(None, description="spacings [m]; the dim-th root of the volume by default")
     surface: PlaceFormula | None = Field(
@@ -44,6 +53,12 @@ class BodyTable(Table):
         description="outward area vectors [m^(dim-1)] of the particles, 0 inside; as the shape has them by default",
     )
     mirror: list[MirrorPlane] = Field([], description="planes behind which the body gets mirror ghosts")
+    reference: choice(ReferencePolicy, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    arrangement: choice(Arrangement, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    scheme: choice(Scheme, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    weight: choice(Weight, optional=True) = Field("None", validate_default=True, description=OWN)  # type: ignore[valid-type]
+    dilation: Number | None = Field(None, gt=0.0, description=OWN)
+    bonded: str | None = Field(None, description="a body above that it is bonded to, as one solid of two materials")
 
     @property
     def dim(self) -> int:
@@ -54,6 +69,16 @@ class BodyTable(Table):
         """The body, without ghosts."""
         x, volume, *given = particles(self.shape, f"body.{name}.shape")
         surface = given[0] if given else None
+        if self.cut is not None:
+            if surface is not None:
+                raise ValueError(
+                    f"body.{name}.cut: a shape with area vectors, {self.shape.kind}, would have none on the cut; "
+                    "take another shape, such as box"
+                )
+            kept = ~self.cut.at(x)[:, 0].astype(bool)
+            if not kept.any():
+                raise ValueError(f"body.{name}.cut: leaves nothing of {len(x)} particles")
+            x, volume = x[kept], np.broadcast_to(volume, len(x))[kept]
         return Body(
             x=x,
             volume=volume if self.volume is None else self.volume.at(x)[:, 0],
@@ -62,6 +87,12 @@ class BodyTable(Table):
             velocity=np.broadcast_to(self.velocity.at(x), x.shape),  # one part is for all components
             surface=surface if self.surface is None else np.broadcast_to(self.surface.at(x), x.shape),
             name=name,
+            reference=self.reference.make(),
+            arrangement=self.arrangement.make(),
+            scheme=self.scheme.make(),
+            weight=self.weight.make(),
+            dilation=self.dilation,
+            bonded=self.bonded,
         )
 
 
@@ -70,7 +101,10 @@ class SolidsOutput(OutputTable):
 
     held = FIELDS
 
-    fields: list[str] | None = Field(None, description=f"fields of a snapshot, all by default: {', '.join(FIELDS)}")
+    fields: list[str] | None = Field(
+        None,
+        description=f"fields of a snapshot, of {', '.join(FIELDS)}; by default {', '.join(DEFAULT_FIELDS)}",
+    )
     body: str | None = Field(None, description="body whose particles are in the snapshots, any by default")
 
 
@@ -81,11 +115,15 @@ class Case(Problem):
     """
 
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
-    boundary: list[choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
+    boundary: list[open_choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
+    interaction: list[own_choice(Interaction)] = Field([], description="forces between bodies")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
+    settle: Number | None = Field(
+        None, gt=0.0, description="end when in equilibrium to this residual; needs the condition Damping"
+    )
     sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
     output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     probe: list[choice(Probe)] = Field([], description="what goes to tables of its own; boundary counts from 0")  # type: ignore
@@ -98,13 +136,21 @@ class Case(Problem):
     def build(self) -> Simulation:
         """The simulation at its start; raises as ``Problem.build``."""
         bodies, ghosts = [], []
-        weight, space = self.weight.make(), self.space
+        space = self.space
+        defaults = Options(
+            reference=self.reference.make(),
+            arrangement=self.arrangement.make(),
+            scheme=self.scheme.make(),
+            weight=self.weight.make(),
+            dilation=self.dilation,
+        )
         for name, table in self.body.items():
             body = table.build(name)
             for plane in table.mirror:
                 depth = plane.depth
                 if depth is None:
-                    depth = 2.0 * weight.support * self.dilation * float(body.spacing.max())
+                    own = options_of(body, defaults)
+                    depth = 3.0 * own.weight.support * own.dilation * float(body.spacing.max())
                 body, condition = mirror(
                     body, point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()
                 )
@@ -114,12 +160,9 @@ class Case(Problem):
         return Simulation(
             bodies,
             boundaries=[*conditions, *ghosts],
-            reference=self.reference.make(),
-            arrangement=self.arrangement.make(),
-            scheme=self.scheme.make(),
+            interactions=[interaction.make(space) for interaction in self.interaction],
             time_step=self.time_step.make(),
-            weight=weight,
-            dilation=self.dilation,
+            **defaults._asdict(),
             periodic=self.periodic,
             dtype=PRECISIONS[self.precision],
             device=self.device,
@@ -127,14 +170,14 @@ class Case(Problem):
         )
 
     def particular(self, simulation: Simulation) -> dict[str, Any]:
-        """The body whose particles snapshots hold, and probes."""
+        """The body whose particles snapshots hold, probes, and when the run is at rest."""
         probes = []
         for table in self.probe:
             arguments = table.arguments()
             if "boundary" in arguments:
                 arguments["boundary"] = simulation.boundaries[arguments["boundary"]]
             probes.append(table.target(**arguments))
-        return {"body": self.output.body, "probes": probes}
+        return {"body": self.output.body, "probes": probes, "settle": self.settle}
 
     @model_validator(mode="after")
     def _agree(self) -> "Case":

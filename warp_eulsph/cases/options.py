@@ -32,7 +32,11 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from ..geometry import Patch
-from .values import Formula, Number, PathText, PlaceTimeFormula, Whole, ZoneFormula, reading
+from ..programs import member
+from .values import Formula, Number, PathText, PlaceTimeFormula, Reading, Whole, ZoneFormula, reading
+
+# How a class of the user's own is named: its module and itself
+OWN_KIND = r"[A-Za-z_]\w*(\.\w+)*:[A-Za-z_]\w*"
 
 
 class Table(BaseModel):
@@ -89,8 +93,10 @@ class Nothing(Options):
 
 
 @functools.cache
-def table_of(target: Callable[..., Any], sole: bool = False) -> type[Options]:
+def table_of(target: Callable[..., Any], sole: bool = False, kind_name: str | None = None) -> type[Options]:
     """The table for a class or function; ``sole`` when nothing else can stand in its place, so that it needs no kind.
+
+    ``kind_name`` is what the kind is if not the target's name.
 
     Raises:
         TypeError: an argument that cannot be written in TOML.
@@ -106,9 +112,9 @@ def table_of(target: Callable[..., Any], sole: bool = False) -> type[Options]:
         else:
             given: Any = "None" if default is None and _may_be_nothing(kind) else _given(default)
             fields[name] = (kind, Field(given, validate_default=given is not None, description=described.get(name)))
-    kind_name = target.__name__
+    kind_name = kind_name or target.__name__
     fields = {"kind": (Literal[kind_name], kind_name if sole else ...), **fields}  # type: ignore[valid-type]
-    model = create_model(kind_name, __base__=Options, __doc__=_summary(target), **fields)
+    model = create_model(target.__name__, __base__=Options, __doc__=_summary(target), **fields)
     model.target = target if isinstance(target, type) else staticmethod(target)
     return model
 
@@ -179,6 +185,18 @@ def choice(*bases: type, optional: bool = False) -> Any:
 
 
 @functools.cache
+def open_choice(base: type) -> Any:
+    """One of the concrete classes below ``base``, or of the user's own, by ``kind = "module:Class"``."""
+    return Annotated[choice(base), _Own(base)]  # type: ignore[arg-type]
+
+
+@functools.cache
+def own_choice(base: type) -> Any:
+    """A class of the user's own below ``base``, of which the package has none."""
+    return Annotated[Options, _Own(base, alone=True)]
+
+
+@functools.cache
 def one_of(*targets: Callable[..., Any], optional: bool = False) -> Any:
     """One of these classes or functions."""
     if len(targets) == 1 and not optional:
@@ -208,6 +226,55 @@ class _Name:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> Any:
         return {"anyOf": [{"enum": list(self.names)}, handler(schema)]}
+
+
+@dataclasses.dataclass(frozen=True)
+class _Own:
+    """Lets a class of the user's own below ``base`` stand there, by its module and name, in files that are trusted."""
+
+    base: type
+    alone: bool = False
+
+    def _validate(self, given: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
+        kind = given.get("kind") if isinstance(given, dict) else given
+        if isinstance(given, Options):
+            return given
+        if not (isinstance(kind, str) and re.fullmatch(OWN_KIND, kind)):
+            if self.alone:
+                raise ValueError(f"kind must name a class below {self.base.__name__} as 'module:Class', got {kind!r}")
+            return handler(given)
+        table = self._table(kind, reading(info))
+        return table.model_validate(given if isinstance(given, dict) else {"kind": kind}, context=info.context)
+
+    def _table(self, kind: str, known: Reading) -> type[Options]:
+        if not known.trust:
+            raise ValueError(
+                f"{kind!r} is a program, and a case file runs none unless it is trusted; look at it, and say --trust "
+                "(in Python trust=True) if it is yours"
+            )
+        target, file = member(kind, known.directory)
+        if not (isinstance(target, type) and issubclass(target, self.base)) or inspect.isabstract(target):
+            raise ValueError(f"{kind!r} must be a whole class below {self.base.__name__}, got {target!r}")
+        if file is not None:
+            known.programs.append(file)
+        try:
+            return table_of(target, kind_name=kind)  # type: ignore[arg-type]
+        except TypeError as error:
+            raise ValueError(f"{kind!r}: {error}") from None
+
+    def _serialize(self, value: Any, handler: Callable[[Any], Any], info: Any) -> Any:
+        own = isinstance(value, Options) and ":" in getattr(value, "kind", "")
+        return value.model_dump(mode=info.mode, exclude_none=info.exclude_none) if own else handler(value)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        inner = handler(source)
+        shown = core_schema.wrap_serializer_function_ser_schema(self._serialize, schema=inner, info_arg=True)
+        return core_schema.with_info_wrap_validator_function(self._validate, inner, serialization=shown)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> Any:
+        kind = {"type": "string", "pattern": f"^{OWN_KIND}$", "description": f"{self.base.__name__} of your own"}
+        table = {"type": "object", "properties": {"kind": kind}, "required": ["kind"]}
+        return {"anyOf": [kind, table] if self.alone else [handler(schema), kind, table]}
 
 
 def concrete(base: type) -> list[type]:
@@ -263,7 +330,7 @@ def _zone_kind(given: Any) -> str:
 
 
 #: Which particles: a comparison of their initial positions, or near a patch of a mesh.
-Zone = Annotated[
+Zone = Annotated[  # type: ignore[valid-type]
     Annotated[ZoneFormula, Tag("formula")] | Annotated[table_of(Patch, sole=True), Tag("patch")],  # type: ignore
     Discriminator(_zone_kind),
 ]

@@ -1,13 +1,15 @@
 """What case files of solids and of transported quantities share: numbers, precision, output."""
 
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import warp as wp
-from pydantic import Field, field_validator
+from pydantic import Field, PrivateAttr, field_validator
 
 from ..output import Recording
-from ..output.fields import Recorded, SnapshotField
+from ..output.fields import SnapshotField
+from ..output.recorded import Recorded
 from ..schedule import AnyOf, AtTimes, EverySteps, EveryTime, Schedule
 from ..space import Space
 from ..weights import Weight
@@ -33,7 +35,9 @@ class OutputTable(Table):
     steps: Whole | None = Field(None, gt=0, description="steps between snapshots")
     at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
     precision: Precision = Field("single", description="of the stored numbers")
-    region: Zone | None = Field(None, description="particles in the snapshots, by initial positions; all by default")
+    region: Zone | None = Field(  # type: ignore[valid-type]
+        None, description="particles in the snapshots, by initial positions; all by default"
+    )
     log: choice(Schedule) = Field({"kind": "EverySteps", "count": 16}, validate_default=True)  # type: ignore[valid-type]
     checkpoint: Number = Field(600.0, gt=0.0, description="wall time between checkpoints [s]")
 
@@ -72,6 +76,12 @@ class Problem(Table):
     precision: Precision = Field("double", description="of the simulation")
     device: str | None = Field(None, description="Warp device such as cuda:0; Warp's default otherwise")
     output: OutputTable
+    _programs: tuple[Path, ...] = PrivateAttr(default=())
+
+    @property
+    def programs(self) -> tuple[Path, ...]:
+        """Files beside the case file with materials and conditions that it names."""
+        return self._programs
 
     @property
     def dim(self) -> int:

@@ -38,13 +38,15 @@ class CaseError(ValueError):
         super().__init__("\n".join([f"{source}: {len(self.problems)} problem{'s' * (len(problems) > 1)}", *problems]))
 
 
-def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case | TransportCase:
+def read_case(path: str | PathLike, overrides: Sequence[str] = (), *, trust: bool = False) -> Case | TransportCase:
     """The case of a TOML file: of solids, or of a transported quantity where it has a table ``transport``.
 
     Args:
         path: the file; paths in it start from its directory.
         overrides: ``key.path=value`` strings that replace or add entries, values written as in TOML (or bare text):
             ``reference=Never``, ``boundary.0.region=y < 0.2``, ``parameters.n=16`` or in short ``n=16``.
+        trust: materials and conditions may be classes of the user's own, ``kind = "module:Class"``, whose modules are
+            run; otherwise nothing that a file says can run code.
 
     Raises:
         CaseError: no such file, not TOML, or any entry that is wrong; it names all of them.
@@ -58,16 +60,19 @@ def read_case(path: str | PathLike, overrides: Sequence[str] = ()) -> Case | Tra
     problems = [problem for override in overrides if (problem := _override(data, override))]
     if problems:
         raise CaseError(source, problems)
-    return parse_case(data, directory=Path(path).parent, source=source)
+    return parse_case(data, directory=Path(path).parent, source=source, trust=trust)
 
 
-def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source: str = "case") -> Case | TransportCase:
+def parse_case(
+    data: dict[str, Any], *, directory: str | PathLike = ".", source: str = "case", trust: bool = False
+) -> Case | TransportCase:
     """The case of a table such as TOML gives, or ``describe`` of a case.
 
     Args:
         data: the table; it is left as it is.
         directory: where paths in it start from.
         source: named in errors.
+        trust: see ``read_case``.
 
     Raises:
         CaseError: entries that are wrong; it names all of them.
@@ -76,7 +81,7 @@ def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source:
     parameters, problems = _parameters(data.get("parameters"))
     definitions, wrong = _definitions(data.get("definitions"), parameters)
     problems += wrong
-    context = Reading(parameters, definitions, Path(directory))
+    context = Reading(parameters, definitions, Path(directory), trust)
     if isinstance(data.get("parameters"), dict):
         data["parameters"] = dict(parameters)
     try:
@@ -85,6 +90,7 @@ def parse_case(data: dict[str, Any], *, directory: str | PathLike = ".", source:
         problems += _explained(error, data, context)
     if problems:
         raise CaseError(source, problems)
+    case._programs = tuple(dict.fromkeys(context.programs))
     return case
 
 

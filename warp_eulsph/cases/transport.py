@@ -23,7 +23,9 @@ class TransportTable(Table):
     velocity: list[Number] = Field(description="a [m/s], (dim,)")
     initial: PlaceFormula = Field(description="u at the start")
     exact: PlaceTimeFormula | None = Field(None, description="u at any time, to be stored and compared")
-    held: Zone | None = Field(None, description="particles that keep their initial value, such as an inflow")
+    held: Zone | None = Field(  # type: ignore[valid-type]
+        None, description="particles that keep their initial value, such as an inflow"
+    )
 
 
 class TransportOutput(OutputTable):

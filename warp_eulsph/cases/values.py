@@ -20,12 +20,16 @@ class Reading:
         parameters: numbers by name that formulas may use.
         definitions: formulas of place and time by name that formulas may use.
         directory: of the case file, which paths start from.
+        trust: whether modules that the file names may be run.
+        programs: files of those that lie beside the case file, noted as they are run.
         keys: id of a table as it was read -> the keys that it may have, noted for messages.
     """
 
     parameters: dict[str, float] = field(default_factory=dict)
     definitions: dict[str, Expression] = field(default_factory=dict)
     directory: Path = Path(".")
+    trust: bool = False
+    programs: list[Path] = field(default_factory=list)
     keys: dict[int, list[str]] = field(default_factory=dict)
 
 

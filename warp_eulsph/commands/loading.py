@@ -2,17 +2,15 @@
 
 import ast
 import difflib
-import importlib.util
 import inspect
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from ..output import Recording
-from ..output.fields import Recorded
+from ..output.recorded import Recorded
+from ..programs import program
 
 EXAMPLE = "example:"
 
@@ -38,13 +36,14 @@ class LoadedCase:
     files: dict[str, str]
 
 
-def load_case(source: str, overrides: Sequence[str] = (), device: str | None = None) -> LoadedCase:
+def load_case(source: str, overrides: Sequence[str] = (), device: str | None = None, trust: bool = False) -> LoadedCase:
     """The case that ``source`` names.
 
     Args:
         source: a ``.toml`` file (see ``warp_eulsph.cases``), a ``.py`` file (see docs/runs.md), or ``example:NAME``.
         overrides: ``key=value`` strings.
         device: Warp device, instead of the case's own.
+        trust: a TOML file may name materials and conditions of the user's own, whose modules are run.
 
     Raises:
         ValueError: no such file or example, or one that is wrong; it says what.
@@ -56,14 +55,14 @@ def load_case(source: str, overrides: Sequence[str] = (), device: str | None = N
     load = {".toml": _load_toml, ".py": _load_python}.get(path.suffix)
     if load is None:
         raise ValueError(f"a case must be a .toml file, a .py file or {EXAMPLE}NAME, got {source!r}")
-    build, until, recording, settings, text = load(path, overrides, device)
+    build, until, recording, settings, files = load(path, overrides, device, trust)
     origin = {
         "source": source if source.startswith(EXAMPLE) else str(path.resolve()),
         "overrides": list(overrides),
         "device": device,
         "settings": settings,
     }
-    return LoadedCase(path.stem, build, until, recording, origin, {f"case{path.suffix}": text})
+    return LoadedCase(path.stem, build, until, recording, origin, files)
 
 
 def examples() -> dict[str, Path]:
@@ -89,24 +88,25 @@ def example_path(name: str) -> Path:
     return known[name]
 
 
-def _load_toml(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
+def _load_toml(path: Path, overrides: Sequence[str], device: str | None, trust: bool) -> tuple[Any, ...]:
     import tomli_w
 
     from ..cases import read_case
 
-    case = read_case(path, [*overrides, *([f"device={device}"] if device else [])])
+    case = read_case(path, [*overrides, *([f"device={device}"] if device else [])], trust=trust)
     described = case.describe()
     text = f"# {path.name} with its defaults and settings, as it was run. SI units.\n{tomli_w.dumps(described)}"
-    return case.build, case.until, case.recording, described, text
+    files = {"case.toml": text, **{file.name: file.read_text(encoding="utf-8") for file in case.programs}}
+    return case.build, case.until, case.recording, described, files
 
 
-def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tuple[Any, ...]:
-    module, text = _module(path), path.read_text(encoding="utf-8")
+def _load_python(path: Path, overrides: Sequence[str], device: str | None, trust: bool) -> tuple[Any, ...]:
+    module, text = program(path), path.read_text(encoding="utf-8")
     case: Any = getattr(module, "CASE", None)
     if hasattr(case, "build"):
         if overrides:
             raise ValueError(f"{path} defines CASE, which takes no settings, got {list(overrides)}")
-        return _on(device, case.build), case.until, case.recording, case.describe(), text
+        return _on(device, case.build), case.until, case.recording, case.describe(), {"case.py": text}
     settings = dict(_setting(override) for override in overrides)
     build, until = getattr(module, "build", None), getattr(module, "UNTIL", None)
     if not callable(build) or not isinstance(until, int | float):
@@ -120,7 +120,7 @@ def _load_python(path: Path, overrides: Sequence[str], device: str | None) -> tu
             raise ValueError(f"{path}: build has no setting {wrong[0]!r}; it has {list(known) or 'none'}")
 
     given = getattr(module, "recording", lambda simulation: Recording())
-    return _on(device, lambda: build(**settings)), float(until), given, settings, text
+    return _on(device, lambda: build(**settings)), float(until), given, settings, {"case.py": text}
 
 
 def _on(device: str | None, build: Callable[[], Recorded]) -> Callable[[], Recorded]:
@@ -145,17 +145,3 @@ def _setting(override: str) -> tuple[str, Any]:
         return name, ast.literal_eval(text)
     except (ValueError, SyntaxError):
         return name, text
-
-
-def _module(path: Path) -> ModuleType:
-    """The file as a module; those beside it can be imported by it."""
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
-    name = f"warp_eulsph_case_{path.stem}"  # which no other module has
-    specification = importlib.util.spec_from_file_location(name, path)
-    assert specification is not None and specification.loader is not None  # for a .py file there is one
-    module = importlib.util.module_from_spec(specification)
-    sys.modules[name] = module  # Warp looks up the module of a function
-    specification.loader.exec_module(module)
-    return module

@@ -8,11 +8,13 @@ STATUS = (
     "Exit status: 0 done, 1 the disk refused, 2 wrong input, 3 unstable or not finite, 75 stopped by a signal, the "
     "wall limit or a file named stop in the directory; resume goes on from there."
 )
+TRUST = "run what the case names: modules with materials or conditions of your own; to resume also its case.py"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of both subcommands."""
     parser.add_argument("--device", help="Warp device such as cuda:0; Warp's default otherwise")
+    parser.add_argument("--trust", action="store_true", help=TRUST)
     parser.add_argument("--until", type=float, metavar="TIME", help="end time [s] instead of the case's")
     parser.add_argument(
         "--max-wall",

@@ -5,7 +5,7 @@ import sys
 import time
 from typing import Any
 
-from ..output.fields import Recorded
+from ..output.recorded import Recorded, transport
 from ..simulation import Simulation
 
 log = logging.getLogger(__name__)
@@ -74,17 +74,17 @@ def health(simulation: Recorded) -> str:
     """The figure that tells soonest that a run goes wrong."""
     if isinstance(simulation, Simulation):
         return f"energy drift {energy_drift(simulation):+.1e}"
-    amounts = simulation.amounts()
-    return f"values {amounts['least']:.3g} to {amounts['largest']:.3g}"
+    amounts = simulation.amounts() if transport(simulation) else {}
+    return f"values {amounts['least']:.3g} to {amounts['largest']:.3g}" if amounts else ""
 
 
 def energy_drift(simulation: Simulation) -> float:
     """Energy that loads and conditions do not explain over that which there is, was, or went through them [-].
 
-    What is dissipated counts.
+    What is dissipated counts, but for what ``Damping`` takes.
     """
     energy = simulation.energy()
     start = simulation.stepper.ledger.start
-    gained = energy["total"] - start - energy["external"] - energy["constraint"]
+    gained = energy["total"] - start - energy["external"] - energy["constraint"] - energy["damping"]
     scale = max(abs(energy["total"]), abs(start), abs(energy["external"]), abs(energy["constraint"]), 1e-300)
     return gained / scale

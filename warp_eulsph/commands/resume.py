@@ -23,7 +23,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("directory", metavar="DIR", type=Path, help="directory of the run")
     parser.add_argument("--force", action="store_true", help="go on although the case has changed")
-    parser.add_argument("--trust", action="store_true", help="run the program (case.py) that the directory names")
     add_options(parser)
     parser.set_defaults(run_command=run)
 
@@ -53,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
                 "say --trust if it is yours"
             )
         device = named if arguments.device is None else arguments.device
-        case = load_case(source, overrides, device)
+        case = load_case(source, overrides, device, arguments.trust)
         until = kept.get("until") if arguments.until is None else arguments.until
         if isinstance(until, bool) or not isinstance(until, int | float):
             raise ValueError(f"run.json must have the end time as a number, got {until!r}; give it as --until")

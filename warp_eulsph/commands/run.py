@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     start_logging()
     try:
-        case = load_case(arguments.case, arguments.set, arguments.device)
+        case = load_case(arguments.case, arguments.set, arguments.device, arguments.trust)
     except (ValueError, OSError) as error:
         return complain(error, BAD_INPUT)
     directory = arguments.output or Path("runs") / case.name

@@ -26,6 +26,7 @@ def make_average(weight: Weight, space: Space, components: int) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def average(
+        first: int,
         reference: Reference,
         near: Neighbours,
         alpha: wp.array(dtype=real),
@@ -33,7 +34,7 @@ def make_average(weight: Weight, space: Space, components: int) -> Any:
         f: wp.array(dtype=row),
         out: wp.array(dtype=row),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a, h_a = reference.x[a], reference.h[a]
         alpha_a, beta_a = alpha[a], beta[a]
         total = row()

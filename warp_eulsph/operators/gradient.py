@@ -47,7 +47,7 @@ def make_gradient(space: Space, components: int, simd: bool = False) -> Any:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.balanced[b], x_a, near.box)
-            sums += wp.outer(f[b] - f_a, xi * near.w[k])
+            sums += wp.outer(f[b] - f_a, xi * near.own[k])
         out[a] = sums @ reference.L[a]
 
     return gradient

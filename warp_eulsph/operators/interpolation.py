@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
 from ..weights import Weight
@@ -22,6 +23,7 @@ def make_interpolate(weight: Weight, space: Space, components: int, transpose: b
 
     @wp.kernel(module="unique", enable_backward=False)
     def interpolate(
+        first: int,
         reference: Reference,
         near: Neighbours,
         alpha: wp.array(dtype=real),
@@ -29,7 +31,7 @@ def make_interpolate(weight: Weight, space: Space, components: int, transpose: b
         f: wp.array(dtype=row),
         out: wp.array(dtype=row),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a, h_a, V_a = reference.x[a], reference.h[a], reference.V[a]
         alpha_a, beta_a = alpha[a], beta[a]
         total = f[a] * (V_a * alpha_a * W_of(real(0.0), h_a))
@@ -59,6 +61,7 @@ def make_mass_diagonals(weight: Weight, space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def mass_diagonals(
+        first: int,
         particles: Particles,
         reference: Reference,
         near: Neighbours,
@@ -67,7 +70,7 @@ def make_mass_diagonals(weight: Weight, space: Space) -> Any:
         lumped: wp.array(dtype=real),
         consistent: wp.array(dtype=real),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a, h_a, V_a = reference.x[a], reference.h[a], reference.V[a]
         N = V_a * alpha[a] * W_of(real(0.0), h_a)
         lumped_a = particles.mass[a] * N
@@ -102,7 +105,7 @@ class Interpolation:
     def __init__(
         self, values: Values, space: Space, weight: Weight, particles: Any, reference: Any, near: Any, device: Any
     ):
-        n = len(particles.mass)
+        n, self._launch = len(particles.mass), Launcher(device)
         self.values, self.space, self.weight, self.device = values, space, weight, device
         self.alpha = wp.zeros(n, dtype=space.real, device=device)
         self.beta = wp.zeros(n, dtype=space.vec, device=device)
@@ -111,24 +114,24 @@ class Interpolation:
     def refresh(self) -> None:
         """Corrections of the present reference."""
         kernel = make_value_correction(self.weight, self.space, self.values.linear)
-        wp.launch(kernel, len(self.alpha), self._arguments, device=self.device)
+        self._launch(kernel, len(self.alpha), self._arguments)
 
     def apply(self, f: wp.array, out: wp.array) -> None:
         """``out`` ← N f for rows ``f`` (n,) of c reals."""
         kernel = make_interpolate(self.weight, self.space, wp.types.type_size(f.dtype), transpose=False)
-        wp.launch(kernel, len(f), [*self._arguments, f, out], device=self.device)
+        self._launch(kernel, len(f), [*self._arguments, f, out])
 
     def transpose(self, f: wp.array, out: wp.array) -> None:
         """``out`` ← Nᵀ f for rows ``f`` (n,) of c reals."""
         kernel = make_interpolate(self.weight, self.space, wp.types.type_size(f.dtype), transpose=True)
-        wp.launch(kernel, len(f), [*self._arguments, f, out], device=self.device)
+        self._launch(kernel, len(f), [*self._arguments, f, out])
 
     def average(self, f: wp.array, out: wp.array) -> None:
         """``out`` ← S(f) of M6 for rows ``f`` (n,) of c reals."""
         kernel = make_average(self.weight, self.space, wp.types.type_size(f.dtype))
-        wp.launch(kernel, len(f), [*self._arguments, f, out], device=self.device)
+        self._launch(kernel, len(f), [*self._arguments, f, out])
 
     def mass_diagonals(self, lumped: wp.array, consistent: wp.array) -> None:
         """M^L_aa and M^C_aa [kg] of the mass matrices lumped and consistent with N, (n,) each."""
         kernel = make_mass_diagonals(self.weight, self.space)
-        wp.launch(kernel, len(lumped), [self.particles, *self._arguments, lumped, consistent], device=self.device)
+        self._launch(kernel, len(lumped), [self.particles, *self._arguments, lumped, consistent])

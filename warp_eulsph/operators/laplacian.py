@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..reduce import Sum
 from ..space import Space
@@ -135,7 +136,7 @@ class LaplacianSolver:
     """
 
     def __init__(self, space: Space, n: int, device: Any):
-        self.space, self.device = space, device
+        self.space, self.device, self._launch = space, device, Launcher(device)
         vector = functools.partial(wp.zeros, dtype=space.vec, device=device)
         self.psi, self.residual = vector(n), vector(n)
         self._p, self._Ap, self._z, self._product = vector(n), vector(n), vector(n), vector(n)
@@ -159,15 +160,15 @@ class LaplacianSolver:
             self._advance(reference, body, start=False)
             self._rz, self._rz_old = self._rz_old, self._rz
             self._sum(self._product[own], self._rz)
-            turn = [body.start, self._rz, self._rz_old, self._z, self._p]
-            wp.launch(_make_turn(self.space), len(body), turn, device=self.device)
+            turn = [self._rz, self._rz_old, self._z, self._p]
+            self._launch(_make_turn(self.space), len(body), turn, body.start)
 
     def _apply(self, reference: Any, near: Any, body: range, f: wp.array) -> None:
-        arguments = [body.start, reference, near, f, self._Ap, self._diagonal, self._product]
-        wp.launch(_make_apply(self.space), len(body), arguments, device=self.device)
+        arguments = [reference, near, f, self._Ap, self._diagonal, self._product]
+        self._launch(_make_apply(self.space), len(body), arguments, body.start)
 
     def _advance(self, reference: Any, body: range, start: bool) -> None:
         scalars = [self._scale, self._rz, self._pAp]
         vectors = [self._Ap, self._p, self.psi, self.residual, self._z, self._product]
-        arguments = [body.start, *scalars, reference.h, self._diagonal, *vectors]
-        wp.launch(_make_advance(self.space, start), len(body), arguments, device=self.device)
+        arguments = [*scalars, reference.h, self._diagonal, *vectors]
+        self._launch(_make_advance(self.space, start), len(body), arguments, body.start)

@@ -50,11 +50,11 @@ def _make_search(space: Space, fill: bool) -> Any:
     separation = difference(space)
     images = 3 if space.periodic else 1
     shifts_y, shifts_z = (images if dim > 1 else 1), (images if dim > 2 else 1)
-    first = -1 if space.periodic else 0
+    lowest = -1 if space.periodic else 0
 
     @wp.kernel(module="unique", enable_backward=False)
     def search(
-        first_a: int,
+        first: int,
         grid: wp.uint64,
         padded: wp.array(dtype=vec3),
         x: wp.array(dtype=vec),
@@ -67,7 +67,7 @@ def _make_search(space: Space, fill: bool) -> Any:
         start: wp.array(dtype=wp.int32),
         index: wp.array(dtype=wp.int32),
     ):
-        a = first_a + wp.tid()
+        a = first + wp.tid()
         reach = support * real(0.5) * (h[a] + h_max[0]) * real(QUERY_MARGIN)
         n = int(0)
         row = int(0)
@@ -81,7 +81,7 @@ def _make_search(space: Space, fill: bool) -> Any:
             for iy in range(images_y):
                 for iz in range(images_z):
                     p = padded[a]
-                    shift = wp.vec3i(ix + first, iy + first, iz + first)
+                    shift = wp.vec3i(ix + lowest, iy + lowest, iz + lowest)
                     inside = bool(True)
                     for i in range(wp.static(dim if space.periodic else 0)):
                         if shift[i] != 0:
@@ -161,11 +161,14 @@ class NeighbourLists:
         body: body numbers, (n,).
         box: lengths of the periodic box [m], zero where open.
         device: Warp device.
+        tilted: whether the weights of a pair's two ends differ (M17).
     """
 
-    def __init__(self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any):
+    def __init__(
+        self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any, tilted: bool = False
+    ):
         self.space, self.device, self._launch = space, device, Launcher(device)
-        self.h, self.body, self.box = h, body, space.vec(*box)
+        self.h, self.body, self.box, self._tilted = h, body, space.vec(*box), tilted
         n = len(h)
         self.support, self._in_cells = weight.support, simd(device)
         self.cells: Cells | None = None
@@ -223,6 +226,7 @@ class NeighbourLists:
         self._launch.forget()
         self.rows.index = wp.zeros(pairs, dtype=wp.int32, device=self.device)
         self.rows.w = wp.zeros(pairs, dtype=self.space.real, device=self.device)
+        self.rows.own = wp.zeros_like(self.rows.w) if self._tilted else self.rows.w
 
     def build(self, x: wp.array) -> None:
         """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.w`` is left to be computed."""

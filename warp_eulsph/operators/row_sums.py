@@ -54,7 +54,7 @@ def laplacian_sum(space: Space, simd: bool) -> Any:
 
 @functools.cache
 def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
-    """``wp.func`` (a, near, f, x) -> Σ_b w_ab (f_b − f_a) ⊗ (x_b − x_a) of two fields of ``vec``, x positions.
+    """``wp.func`` (a, near, f, x) -> Σ_b w_ab (f_b − f_a) ⊗ (x_b − x_a) of two fields of ``vec``, x positions, own w.
 
     With ``of_positions`` f are positions too, whose differences take the nearest image in a periodic box.
     """
@@ -72,7 +72,7 @@ def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
                 df = f[b] - f_a
                 if wp.static(of_positions):
                     df = separation(f[b], f_a, near.box)
-                sums += wp.outer(df, separation(x[b], x_a, near.box) * near.w[k])
+                sums += wp.outer(df, separation(x[b], x_a, near.box) * near.own[k])
             return sums
 
         return outer_sum
@@ -115,7 +115,7 @@ def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
 
     @wp.func
     def outer_sum_simd(a: int, near: Neighbours, f: wp.array(dtype=vec), x: wp.array(dtype=vec)):
-        return outer_row(a, near.start[a], near.start[a + 1], near.index, near.w, near.box, f, x)
+        return outer_row(a, near.start[a], near.start[a + 1], near.index, near.own, near.box, f, x)
 
     return outer_sum_simd
 

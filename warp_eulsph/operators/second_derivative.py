@@ -23,13 +23,14 @@ def make_second_derivative(space: Space, components: int) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def second_derivative(
+        first: int,
         reference: Reference,
         near: Neighbours,
         f: wp.array(dtype=row),
         gradient: wp.array(dtype=row_gradient),
         out: wp.array(dtype=row),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a = reference.x[a]
         f_a = f[a]
         gradient_a = gradient[a]

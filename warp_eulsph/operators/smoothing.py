@@ -25,6 +25,7 @@ def make_linear_exact(space: Space, components: int) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def linear_exact(
+        first: int,
         particles: Particles,
         reference: Reference,
         near: Neighbours,
@@ -33,7 +34,7 @@ def make_linear_exact(space: Space, components: int) -> Any:
         gradient: wp.array(dtype=row_gradient),
         out: wp.array(dtype=row),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a = reference.x[a]
         f_a = f[a]
         gradient_a = gradient[a]

@@ -48,12 +48,13 @@ def make_value_correction(weight: Weight, space: Space, linear: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def value_correction(
+        first: int,
         reference: Reference,
         near: Neighbours,
         alpha: wp.array(dtype=real),
         beta: wp.array(dtype=vec),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a = reference.x[a]
         h_a = reference.h[a]
         M_0 = reference.V[a] * W_of(real(0.0), h_a)

@@ -2,19 +2,19 @@
 
 from ..options import explain_mistakes
 from .directory import BusyError, RunDirectory
-from .fields import FIELDS, TRANSPORT_FIELDS
+from .fields import DEFAULT_FIELDS, FIELDS, TRANSPORT_FIELDS
 from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
 from .reader import Comparison, Run, RunFrame, points_on_line
 from .record import ChangedCaseError, Outcome, record
 from .recording import Recording
 from .recover import Findings, check, recover
-from .report import Figure, table
 from .sealed import DamagedError
 from .series import SnapshotWriter
 from .snapshot import Snapshot, read_snapshot, write_snapshot
 from .stopping import Stop
 
 __all__ = [
+    "DEFAULT_FIELDS",
     "FIELDS",
     "TRANSPORT_FIELDS",
     "BodyProbe",
@@ -22,7 +22,6 @@ __all__ = [
     "ChangedCaseError",
     "Comparison",
     "DamagedError",
-    "Figure",
     "Findings",
     "Outcome",
     "PointProbe",
@@ -41,7 +40,6 @@ __all__ = [
     "read_snapshot",
     "record",
     "recover",
-    "table",
     "write_snapshot",
 ]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from .atomic import replace_file
 from .directory import numbered
-from .fields import Recorded
+from .recorded import Recorded
 from .sealed import DamagedError
 
 log = logging.getLogger(__name__)

@@ -1,8 +1,10 @@
 """Fields that a frame derives from those it holds."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from .tensors import padded
+from .tensors import first_piola
 
 #: Units of the fields that a frame derives from those it holds.
 DERIVED = {
@@ -16,6 +18,14 @@ DERIVED = {
 
 class Derived:
     """Stresses and strains of a frame with ``cauchy_stress`` and ``F``."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def F(self) -> np.ndarray: ...
+
+        @property
+        def cauchy_stress(self) -> np.ndarray: ...
 
     @property
     def von_mises(self) -> np.ndarray:
@@ -44,5 +54,4 @@ class Derived:
     @property
     def first_piola(self) -> np.ndarray:
         """First Piola–Kirchhoff stresses J σ F⁻ᵀ, force per initial area [Pa], (N, 3, 3); missing stretches are 1."""
-        F = padded(self.F.astype(float), 1.0)
-        return np.linalg.det(F)[:, None, None] * self.cauchy_stress @ np.linalg.inv(F).transpose(0, 2, 1)
+        return first_piola(self.cauchy_stress.astype(float), self.F.astype(float))

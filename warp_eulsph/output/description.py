@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ..simulation import Simulation
-from ..transport import Transport
+from ..body import Body
+from ..building import Options
 from .describer import Describer
-from .fields import Recorded
+from .recorded import Recorded, RecordedSolids, RecordedTransport, solids, transport
 
 
 def describe(simulation: Recorded) -> dict[str, Any]:
@@ -23,19 +23,20 @@ def describe(simulation: Recorded) -> dict[str, Any]:
         "dtype": simulation.space.real.__name__,
         "weight": plain(configuration.weight),
         "periodic": [float(length) for length in configuration.lists.box],
-        **(_solids(simulation) if isinstance(simulation, Simulation) else _transport(simulation)),
+        **(_solids(simulation) if solids(simulation) else {}),
+        **(_transport(simulation) if transport(simulation) else {}),
     }
 
 
-def _transport(transport: Transport) -> dict[str, Any]:
-    law, particles = transport.law, transport.particles
+def _transport(simulation: RecordedTransport) -> dict[str, Any]:
+    law, particles = simulation.law, simulation.particles
     return {
         "scheme": plain(law.scheme),
         "flux": plain(law.flux),
-        "time_step": transport.time_step,
-        "exact": plain(transport.exact),
+        "time_step": simulation.time_step,
+        "exact": plain(simulation.exact),
         "particles": {
-            "x": plain(transport.x),
+            "x": plain(simulation.x),
             **{name: plain(getattr(particles, name).numpy()) for name in ("V0", "h")},
             "start": plain(law.start),
             "held": plain(law.held),
@@ -43,22 +44,35 @@ def _transport(transport: Transport) -> dict[str, Any]:
     }
 
 
-def _solids(simulation: Simulation) -> dict[str, Any]:
+def _solids(simulation: RecordedSolids) -> dict[str, Any]:
     stepper = simulation.stepper
     conditions = zip(simulation.boundaries, simulation.conditions, strict=True)
+    exchanges = zip(simulation.interactions, simulation.bound_interactions, strict=True)
+    interactions = {
+        str(i): {**plain(interaction), "particles": plain(bound.indices)}
+        for i, (interaction, bound) in enumerate(exchanges)
+    }
     return {
+        **({"interactions": interactions} if interactions else {}),
         "scheme": plain(stepper.options),
         "reference": plain(simulation.reference),
         "arrangement": plain(simulation.arrangement),
         "time_step": plain(simulation.clock.option),
         "dilation": simulation.dilation,
         "sort": simulation.sorting.on,
-        "bodies": {body.name: plain(body) for body in simulation.bodies},
+        "bodies": {body.name: _body(body) for body in simulation.bodies},
         "boundaries": {
             str(i): {**plain(boundary), "particles": plain(condition.indices)}
             for i, (boundary, condition) in enumerate(conditions)
         },
     }
+
+
+def _body(body: Body) -> dict[str, Any]:
+    """A body, with those options that it has of its own."""
+    options: dict[str, Any] = plain(body)
+    seldom = (*Options._fields, "bonded")
+    return {name: value for name, value in options.items() if name not in seldom or getattr(body, name) is not None}
 
 
 def plain(value: Any) -> Any:

@@ -234,7 +234,7 @@ class RunDirectory:
         replace_file(path, (json.dumps(seal(content), indent=1) + "\n").encode())
 
     def keep(self, name: str, text: str) -> None:
-        """Replace ``case.toml`` or ``case.py``.
+        """Replace ``case.toml``, ``case.py`` or a module that the case names.
 
         Raises:
             OSError: the disk refused; the file is as it was.

@@ -4,7 +4,7 @@ import platform
 from pathlib import Path
 from typing import Any
 
-from .fields import Recorded
+from .recorded import Recorded
 
 
 def environment(simulation: Recorded) -> dict[str, Any]:

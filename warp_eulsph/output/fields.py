@@ -8,26 +8,27 @@ import warp as wp
 
 from ..fields import PARTICLES, STATE
 from ..scheme.reference import LARGEST_GROWTH, LEAST_GROWTH
-from ..simulation import Simulation
-from ..transport import Transport
+from .recorded import Recorded, solids, transport
 from .stress import stress_array
-
-#: What can be recorded.
-Recorded = Simulation | Transport
+from .tensors import first_piola
 
 
 class SnapshotField(NamedTuple):
-    """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and how it is made of sources."""
+    """A field of a snapshot: shape of one value at a dimension, SI unit, meaning, and how it is made of sources.
+
+    ``default`` says whether snapshots hold it unless fields are chosen.
+    """
 
     shape: Callable[[int], tuple[int, ...]]
     unit: str
     meaning: str
     sources: tuple[str, ...]
     values: Callable[..., np.ndarray] = lambda source: source
+    default: bool = True
 
 
 def _positions(simulation: Recorded) -> wp.array:
-    return simulation.stepper.U.x if isinstance(simulation, Simulation) else simulation.configuration.fields.x
+    return simulation.stepper.U.x if solids(simulation) else simulation.configuration.fields.x
 
 
 #: What fields are made of: arrays of the device, by place, to be copied, or of the host, by number, made for it.
@@ -42,6 +43,10 @@ SOURCES: dict[str, Callable[[Any], wp.array | np.ndarray]] = {
     "body": lambda simulation: simulation.particles.body,
     "share": lambda simulation: simulation.particles.share,
     "h": lambda simulation: simulation.particles.h,
+    "X": lambda simulation: simulation.X,
+    "force": lambda simulation: simulation.force,
+    "energy_density": lambda simulation: simulation.strain_energy_density,
+    "mismatch": lambda simulation: simulation.mismatch,
     "particle": lambda simulation: np.arange(len(simulation.particles.mass), dtype=np.int32),
     "U": lambda transport: transport.values,
     "exact": lambda transport: transport.exact_values,
@@ -76,6 +81,34 @@ FIELDS = {
         lambda x, h, J: h * np.clip(J ** (1.0 / x.shape[1]), LEAST_GROWTH, LARGEST_GROWTH),
     ),
     "particle": SnapshotField(lambda d: (), "-", "number of the particle in the simulation", ("particle",)),
+    "displacement": SnapshotField(
+        lambda d: (d,), "m", "displacement since the start", ("x", "X"), lambda x, X: x - X, default=False
+    ),
+    "acceleration": SnapshotField(
+        lambda d: (d,),
+        "m/s^2",
+        "acceleration in the last step, zero before the first",
+        ("force", "mass"),
+        lambda force, mass: force / mass[:, None],
+        default=False,
+    ),
+    "force": SnapshotField(
+        lambda d: (d,), "N", "force on the particle in the last step, zero before the first", ("force",), default=False
+    ),
+    "first_piola": SnapshotField(
+        lambda d: (3, 3),
+        "Pa",
+        "first Piola-Kirchhoff stress, force per initial area",
+        ("stress", "F"),
+        first_piola,
+        default=False,
+    ),
+    "strain_energy_density": SnapshotField(
+        lambda d: (), "J/m^3", "stored energy per initial volume", ("energy_density",), default=False
+    ),
+    "mismatch": SnapshotField(
+        lambda d: (), "-", "how far positions and F disagree, in spacings (M16)", ("mismatch",), default=False
+    ),
 }
 
 #: Fields of a transported quantity, on particles that stay where they are; the exact one only where it is known.
@@ -87,10 +120,12 @@ TRANSPORT_FIELDS = {
     **{name: FIELDS[name] for name in ("body", "particle")},
 }
 KNOWN = {**FIELDS, **TRANSPORT_FIELDS}
+#: Fields of solids that snapshots hold unless others are chosen.
+DEFAULT_FIELDS = tuple(name for name, field in FIELDS.items() if field.default)
 
 
 def known_fields(names: Iterable[str] | None) -> tuple[str, ...] | None:
-    """The names, checked to be those of some field; None stays None, all that there will be.
+    """The names, checked to be those of some field; None stays None, those by default.
 
     Raises:
         ValueError: a name of no field.
@@ -99,19 +134,19 @@ def known_fields(names: Iterable[str] | None) -> tuple[str, ...] | None:
 
 
 def chosen_fields(names: Iterable[str] | None, simulation: Recorded) -> dict[str, SnapshotField]:
-    """The fields of these names, all if None, that snapshots of ``simulation`` hold.
+    """The fields of these names, those by default if None, that snapshots of ``simulation`` hold.
 
     Raises:
         ValueError: a name that is none of its fields.
     """
-    if isinstance(simulation, Simulation):
+    if not transport(simulation):
         return _chosen(names, FIELDS)
     held = {name: field for name, field in TRANSPORT_FIELDS.items() if name != "exact" or simulation.exact is not None}
     return _chosen(names, held)
 
 
 def _chosen(names: Iterable[str] | None, fields: dict[str, SnapshotField]) -> dict[str, SnapshotField]:
-    wanted = list(fields) if names is None else list(names)
+    wanted = [name for name, field in fields.items() if field.default] if names is None else list(names)
     unknown = [name for name in wanted if name not in fields]
     if unknown:
         raise ValueError(f"snapshot fields must be among {list(fields)}, got {unknown}")

@@ -8,7 +8,6 @@ import xarray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from .derived import DERIVED
 from .fields import KNOWN
 from .reader import Run, RunFrame
 
@@ -40,7 +39,7 @@ def dataset(run: Run, fields: Sequence[str] | None) -> xarray.Dataset:
     """See ``Run.to_xarray``."""
     if not len(run):
         raise ValueError(f"{run.directory.path} holds no snapshots yet")
-    names, units = [name for name in run.fields if name not in DERIVED] if fields is None else list(fields), run.units
+    names, units = list(run[0].units) if fields is None else list(fields), run.units
     unknown = [name for name in names if name not in units]
     if unknown:
         raise ValueError(f"fields must be among {list(units)}, got {unknown}")

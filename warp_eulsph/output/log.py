@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..simulation import Simulation
 from .atomic import append_line
-from .fields import Recorded
+from .recorded import Recorded, RecordedSolids, solids, transport
 from .sealed import read_lines, sealed_line
 
 log = logging.getLogger(__name__)
@@ -17,10 +16,12 @@ log = logging.getLogger(__name__)
 def look(simulation: Recorded) -> dict[str, Any]:
     """What a line of the log holds of the present state; SI units."""
     line = {"step": simulation.steps, "t": simulation.t, "dt": simulation.dt}
-    return line | (_solids(simulation) if isinstance(simulation, Simulation) else simulation.amounts())
+    if transport(simulation):
+        return line | simulation.amounts()
+    return line | (_solids(simulation) if solids(simulation) else {})
 
 
-def _solids(simulation: Simulation) -> dict[str, Any]:
+def _solids(simulation: RecordedSolids) -> dict[str, Any]:
     return {
         **simulation.energy(),
         "momentum": simulation.momentum().tolist(),

@@ -10,9 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..boundaries import Boundary
+from ..building import options_of
 from ..diagnostics import BodySums, SectionForce
 from ..schedule import EverySteps, Schedule
-from ..simulation import Simulation
+from .recorded import RecordedSolids
 from .shape_functions import shape_functions
 from .stress import body_stress, stresses
 
@@ -48,7 +49,7 @@ class Probe(ABC):
             )
 
     @abstractmethod
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         """What measures; made before the first step, for a run that is resumed too.
 
         Raises:
@@ -72,7 +73,7 @@ class PointProbe(Probe):
     body: str | None = None
     units: ClassVar[dict[str, str]] = {"x": "m", "v": "m/s", "F": "-", "cauchy_stress": "Pa"}
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         body = _body(self, simulation, self.body)
         point = np.asarray(self.X, dtype=float)
         if point.shape != (simulation.space.dim,) or not np.isfinite(point).all():
@@ -107,7 +108,7 @@ class BodyProbe(Probe):
         "kinetic": "J",
     }
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         particles = simulation.ranges[_body(self, simulation, self.body).name]
         sums = BodySums(simulation.space, simulation.particles, particles, simulation.device)
         return lambda: dict(sums(simulation.stepper.U))
@@ -124,7 +125,7 @@ class ReactionProbe(Probe):
     boundary: Boundary
     units: ClassVar[dict[str, str]] = {"force": "N"}
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         if self.boundary not in simulation.boundaries:
             raise ValueError(
                 f"probe {self.name!r}: boundary must be one of the simulation's {len(simulation.boundaries)}, "
@@ -151,7 +152,7 @@ class SectionProbe(Probe):
     body: str | None = None
     units: ClassVar[dict[str, str]] = {"force": "N"}
 
-    def bind(self, simulation: Simulation) -> Measure:
+    def bind(self, simulation: RecordedSolids) -> Measure:
         body, dim = _body(self, simulation, self.body), simulation.space.dim
         point, normal = (np.asarray(given, dtype=float) for given in (self.point, self.normal))
         if point.shape != (dim,) or normal.shape != (dim,) or not np.linalg.norm(normal) > 0.0:
@@ -170,7 +171,7 @@ class SectionProbe(Probe):
         return lambda: {"force": force(simulation.stepper.forces)}
 
 
-def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
+def _body(probe: Probe, simulation: RecordedSolids, name: str | None) -> Any:
     if name is None:
         return simulation.bodies[0]
     for body in simulation.bodies:
@@ -179,11 +180,10 @@ def _body(probe: Probe, simulation: Simulation, name: str | None) -> Any:
     raise ValueError(f"probe {probe.name!r}: body must be one of {sorted(simulation.ranges)}, got {name!r}")
 
 
-def _shape_functions(simulation: Simulation, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _shape_functions(simulation: RecordedSolids, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
-    n, weight = len(body.x), simulation.stepper.configuration.weight
-    h, volume = (np.broadcast_to(given, n) for given in (simulation.dilation * body.spacing, body.volume))
-    functions = shape_functions(X[None, :], body.x, volume, h, weight)
+    options = options_of(body, simulation.options)
+    functions = shape_functions(X[None, :], body.x, body.volume, options.dilation * body.spacing, options.weight)
     if not functions.inside[0]:
         raise ValueError(
             f"probe {name!r}: X = {X.tolist()} m must lie in body {body.name!r}, whose particles lie in "

@@ -124,7 +124,7 @@ class RunFrame(Derived):
         Raises:
             KeyError: the file has no such field, or not what it derives from.
         """
-        return getattr(self, name) if name in DERIVED else self[name]
+        return getattr(self, name) if name in DERIVED and name not in self.units else self[name]
 
     def interpolate(self, points: np.ndarray, name: str) -> np.ndarray:
         """A field at points of space: corrected SPH sums, exact for fields that are linear in the present positions.
@@ -261,7 +261,7 @@ class Run(Sequence[RunFrame]):
         held = list(self[0].units) if len(self) else []
         needs = {name: {"cauchy_stress" if unit == "Pa" else "deformation_gradient"} for name, unit in DERIVED.items()}
         needs["first_piola"] = {"cauchy_stress", "deformation_gradient"}
-        return held + [name for name, need in needs.items() if need <= set(held)]
+        return held + [name for name, need in needs.items() if need <= set(held) and name not in held]
 
     @property
     def units(self) -> dict[str, str]:

@@ -14,15 +14,16 @@ import numpy as np
 
 from ..schedule import next_target
 from ..scheme.health import UnstableError
-from ..transport import Transport
+from ..settling import check_damped
 from .atomic import replace_file
 from .checkpoint import Checkpoint, Checkpoints, take
 from .description import describe, differences, plain
 from .directory import RunDirectory
 from .environment import environment
-from .fields import Recorded, chosen_fields
+from .fields import chosen_fields
 from .log import append, look
 from .probes import Measure
+from .recorded import Recorded, solids
 from .recording import Recording
 from .sealed import DamagedError, read_lines, sealed_line
 from .series import SnapshotWriter
@@ -108,6 +109,8 @@ def record(
         recording.schedule.check(present, until)
         # What is wrong with fields, probes and region is told before files move
         chosen_fields(recording.fields, simulation)
+        if recording.settle is not None:
+            check_damped(simulation)
         measures = _measures(simulation, recording)
         particles = recording.particles(simulation)
         description = _description(simulation, recording, particles)
@@ -131,11 +134,11 @@ def record(
 
 def _measures(simulation: Recorded, recording: Recording) -> list[Measure]:
     """What the probes measure."""
-    if isinstance(simulation, Transport):
-        if recording.probes:
-            raise ValueError(f"probes look at solids, got {recording.probes[0].name!r} for a transported quantity")
-        return []
-    return [probe.bind(simulation) for probe in recording.probes]
+    if solids(simulation):
+        return [probe.bind(simulation) for probe in recording.probes]
+    if recording.probes:
+        raise ValueError(f"probes look at solids, got {recording.probes[0].name!r} for a transported quantity")
+    return []
 
 
 def _begin(home: RunDirectory, simulation: Recorded, content: dict[str, Any], *, replace: bool) -> None:
@@ -243,10 +246,12 @@ class _Recorder:
             if not self.resumed:
                 self.keep(everything=True)
                 self.checkpoint()
-            while simulation.t < until and reason is None:
+            settled = False
+            while simulation.t < until and reason is None and not settled:
                 self._advance(until)
                 self.worker.check()
-                self.keep(everything=simulation.t >= until)
+                settled = self.recording.settled(simulation)
+                self.keep(everything=settled or simulation.t >= until)
                 reason = stop.reason() if stop is not None else None
                 if watch is not None:
                     watch(simulation)
@@ -254,7 +259,9 @@ class _Recorder:
             self.worker.drain()
             self.worker.check()
             self.snapshots.finish()
-            state = "done" if reason is None or simulation.t >= until else "stopped"
+            state = "done" if reason is None or settled or simulation.t >= until else "stopped"
+            if settled:
+                log.info("in equilibrium: residual at most %g at t = %.6g s", self.recording.settle, simulation.t)
         except UnstableError as error:
             state, reason = "unstable", str(error)
             self._flush_lines()  # what came before the failure tells most about it

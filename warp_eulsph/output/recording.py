@@ -10,9 +10,14 @@ import numpy as np
 from ..boundaries import Assembly, Region
 from ..checks import objects
 from ..schedule import AnyOf, AtTimes, EverySteps, Schedule
-from .fields import Recorded, known_fields
+from ..settling import STEPS_BETWEEN_LOOKS, check_tolerance, residual
+from .fields import known_fields
 from .probes import Probe
+from .recorded import Recorded
 from .snapshot import checked_precision
+
+# When it is looked whether the bodies are in equilibrium
+BALANCE = EverySteps(STEPS_BETWEEN_LOOKS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +26,7 @@ class Recording:
 
     Args:
         snapshots: when a snapshot is written besides the start and the end.
-        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``) in them; all by default.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``) in them; ``DEFAULT_FIELDS`` (or all of these) by default.
         dtype: ``np.float32`` or ``np.float64`` of their reals.
         region: which particles are in them (see ``Region`` of the boundaries), by initial positions or numbers; all by
             default. Their numbers are in the field ``particle``. Log, probes and checkpoints are of all particles.
@@ -30,6 +35,7 @@ class Recording:
             between two looks at it, so that other numbers of steps cost time there.
         probes: what goes to tables of its own.
         checkpoint: wall time between checkpoints [s]; one is written at the start, at the end and at a stop, too.
+        settle: residual at which bodies count as in equilibrium (see ``settle``), which ends the run; None runs on.
 
     Raises:
         ValueError: unknown fields or dtype, probes of equal names, a wall time that is not positive.
@@ -43,6 +49,7 @@ class Recording:
     log: Schedule = EverySteps(16)
     probes: Sequence[Probe] = ()
     checkpoint: float = 600.0
+    settle: float | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.fields, str):
@@ -55,6 +62,8 @@ class Recording:
             raise ValueError(f"names of probes must differ, got {names}")
         if math.isnan(self.checkpoint) or self.checkpoint <= 0.0:
             raise ValueError(f"checkpoint must be a positive wall time [s], got {self.checkpoint}; 600 is 10 minutes")
+        if self.settle is not None:
+            check_tolerance(self.settle)
 
     def particles(self, simulation: Recorded) -> np.ndarray | None:
         """Numbers of the particles that snapshots hold, (k,) int32, ascending; None if all.
@@ -71,4 +80,11 @@ class Recording:
     @property
     def schedule(self) -> Schedule:
         """When anything is due."""
-        return AnyOf([self.snapshots, self.log, *(probe.schedule for probe in self.probes)])
+        looks = [] if self.settle is None else [BALANCE]
+        return AnyOf([self.snapshots, self.log, *(probe.schedule for probe in self.probes), *looks])
+
+    def settled(self, simulation: Recorded) -> bool:
+        """Whether this is a step at which the balance is looked at, and the bodies are in equilibrium."""
+        if self.settle is None or not BALANCE.due(simulation.t, simulation.steps):
+            return False
+        return residual(simulation) <= self.settle  # type: ignore[arg-type]

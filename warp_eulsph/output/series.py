@@ -11,20 +11,21 @@ import numpy as np
 from .atomic import replace_file
 from .copies import Copies
 from .directory import RunDirectory
-from .fields import Recorded, known_fields
+from .fields import known_fields
 from .manifest import Manifest, entry_of
+from .recorded import Recorded
 from .snapshot import Frame, checked_precision, collect, encode
 from .temporal import write_index
 
-# The index names every snapshot, so that making it costs more from frame to frame: a tenth more of them is worth it.
-_GROWTH = 1.1
+# The index names every snapshot, so that making it costs more from frame to frame: half as many again are worth it.
+_GROWTH = 1.5
 
 
 class SnapshotWriter:
     """Writes ``snap/0000001200.vtkhdf`` for step 1200, its line in ``manifest.jsonl``, and the lists for ParaView.
 
     ``run.vtkhdf.series`` lists the snapshots with their times; ``run.vtkhdf`` is one file over all of them, renewed
-    when a tenth more have come and by ``finish``. A new writer starts a new run: what an older one left in the
+    when half as many again have come and by ``finish``. A new writer starts a new run: what an older one left in the
     directory moves to ``abandoned/`` there.
 
     Attributes:
@@ -33,7 +34,7 @@ class SnapshotWriter:
 
     Args:
         directory: of the run; made if absent.
-        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); all if None.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); those by default if None.
         dtype: ``np.float32`` or ``np.float64`` of the stored reals.
         particles: numbers of those that snapshots hold, (k,), written as the field ``particle`` too; all if None.
         resume: go on after the snapshots that are there.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import launch
 from ..space import Space
 from ..weights import Weight
 from ..weights.base import value
@@ -152,8 +153,8 @@ def _make_weigh(weight: Weight, space: Space) -> Any:
     real, W_of = space.real, value(weight, space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def weigh(r: wp.array(dtype=real), h: wp.array(dtype=real), out: wp.array(dtype=real)):
-        i = wp.tid()
+    def weigh(first: int, r: wp.array(dtype=real), h: wp.array(dtype=real), out: wp.array(dtype=real)):
+        i = first + wp.tid()
         out[i] = W_of(r[i], h[i])
 
     return weigh
@@ -163,5 +164,5 @@ def _weights(r: np.ndarray, h: np.ndarray, weight: Weight, dim: int) -> np.ndarr
     """W(r, h) [1/m^dim] of distances and smoothing lengths [m], (k,) each, on the CPU in double precision."""
     given = [wp.array(values, dtype=wp.float64, device="cpu") for values in (r, h)]
     out = wp.zeros(len(r), dtype=wp.float64, device="cpu")
-    wp.launch(_make_weigh(weight, Space(dim, wp.float64)), len(r), [*given, out], device="cpu")
+    launch(_make_weigh(weight, Space(dim, wp.float64)), len(r), [*given, out], "cpu")
     return out.numpy()

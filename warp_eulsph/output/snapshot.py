@@ -15,8 +15,9 @@ import warp as wp
 from ..fields import STATE
 from .atomic import replace_file
 from .copies import Copies, Copy
-from .fields import SOURCES, Recorded, SnapshotField, chosen_fields
+from .fields import SOURCES, SnapshotField, chosen_fields
 from .hdf5 import DIGEST, check_layout, digest_of_layout, member, names, opened, read, seal
+from .recorded import Recorded
 from .sealed import DamagedError
 from .tensors import padded
 
@@ -92,9 +93,12 @@ class Frame:
 def collect(
     simulation: Recorded, names: Iterable[str] | None, particles: np.ndarray | None = None, copies: Copies | None = None
 ) -> Frame:
-    """What the fields of these ``names``, all if None, are made of in the present state, of all ``particles`` if None.
+    """What the fields of these ``names`` are made of in the present state.
 
-    ``copies`` makes the copies, which may be on their way then; without it all is there.
+    Args:
+        names: of fields; those by default if None.
+        particles: numbers of those asked for, (k,); all if None.
+        copies: makes the copies, which may be on their way then; if None all is there.
     """
     simulation.whole.check()
     fields, places = chosen_fields(names, simulation), simulation.order.places
@@ -130,7 +134,7 @@ def write_snapshot(
     Args:
         path: file to make or replace, by custom ``*.vtkhdf``.
         simulation: its state.
-        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); all if None. Positions are always there.
+        fields: names of ``FIELDS`` (or ``TRANSPORT_FIELDS``); those by default if None. Positions are always there.
         dtype: ``np.float32`` or ``np.float64`` for positions and real fields; time is float64 always.
 
     Raises:

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import launch
 from ..materials import Law, Material
 from ..scheme.flux import stress_in_reference
-from ..simulation import Simulation
 from ..space import Space, matrix_type
+from .recorded import RecordedSolids
 
 
 @functools.cache
@@ -21,18 +22,18 @@ def _make_cauchy(space: Space, full: Space, law: Law) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def cauchy(first: int, F: wp.array(dtype=mat), c: Constants, sigma: wp.array(dtype=mat33)):
-        i = wp.tid()
-        F_i = F[first + i]
+        a = first + wp.tid()
+        F_a = F[a]
         G = wp.identity(n=wp.static(full_dim), dtype=real)
         for j in range(wp.static(dim)):
             for k in range(wp.static(dim)):
-                G[j, k] = F_i[j, k]
+                G[j, k] = F_a[j, k]
         stress = Q_of(G, G, c)
         out = mat33()
         for j in range(wp.static(full_dim)):
             for k in range(wp.static(full_dim)):
                 out[j, k] = stress[j, k]
-        sigma[first + i] = out
+        sigma[a] = out
 
     return cauchy
 
@@ -49,8 +50,8 @@ def body_stress(space: Space, material: Material, body: range, F: wp.array, sigm
     constants = law.Constants()
     for name, value in material.constants().items():
         setattr(constants, name, value)
-    arguments = [body.start, F, constants, sigma]
-    wp.launch(_make_cauchy(Space(space.dim, space.real), full, law), len(body), arguments, device=F.device)
+    kernel = _make_cauchy(Space(space.dim, space.real), full, law)
+    launch(kernel, len(body), [F, constants, sigma], F.device, body.start)
 
 
 def stresses(space: Space, n: int, device: Any) -> wp.array:
@@ -58,7 +59,7 @@ def stresses(space: Space, n: int, device: Any) -> wp.array:
     return wp.empty(n, dtype=matrix_type(3, 3, space.real), device=device)
 
 
-def stress_array(simulation: Simulation) -> wp.array:
+def stress_array(simulation: RecordedSolids) -> wp.array:
     """σ = P(F) Fᵀ / J [Pa] of the present state by place, (n,) of 3 × 3: M1, the reference being the present.
 
     In 2-D and 1-D the 3-D law acts on F with the missing stretches equal to one, so σ33 of plane strain is there too.
@@ -70,6 +71,6 @@ def stress_array(simulation: Simulation) -> wp.array:
     return sigma
 
 
-def cauchy_stress(simulation: Simulation) -> np.ndarray:
+def cauchy_stress(simulation: RecordedSolids) -> np.ndarray:
     """``stress_array`` on the host, by number, (n, 3, 3)."""
     return simulation.order.by_number(stress_array(simulation).numpy())

@@ -17,7 +17,7 @@ from ..output.reader import RunFrame
 from .cells import spacing
 from .plane import LONG, draw_line, draw_plane
 from .quantity import quantity
-from .volume import draw_volume
+from .volume import breadth, draw_volume
 
 FILMS = (".gif", ".mp4")
 
@@ -136,13 +136,15 @@ def fitted(options: Picture, frames: Iterable[RunFrame]) -> Picture:
     if limits is None and np.isfinite(least) and np.isfinite(largest):
         wide = largest - least > 1e-12 * max(abs(least), abs(largest))
         limits = (least, largest) if wide else (least - 0.5, largest + 0.5)
-    size = suited(extent) if options.size is None else options.size
+    size = suited(extent, options.view) if options.size is None else options.size
     return replace(options, spacing=edge, limits=limits, extent=extent, size=size)
 
 
-def suited(extent: np.ndarray) -> tuple[int, int]:
+def suited(extent: np.ndarray, view: Sequence[float] = Picture.view) -> tuple[int, int]:
     """Pixels of a page without an empty half: upright for columns, flat for beams; even numbers."""
-    if extent.shape[1] != 2:
+    if extent.shape[1] == 3:
+        return 2 * round(min(max(350.0 + 700.0 * breadth(extent, view), 700.0), 1200.0) / 2.0), 700
+    if extent.shape[1] == 1:
         return 1000, 700
     wide, high = extent[1] - extent[0]
     if wide > LONG * high:  # the colour bar lies beneath

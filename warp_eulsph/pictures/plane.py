@@ -1,5 +1,7 @@
 """Pictures in 1-D and 2-D, by matplotlib."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,6 +78,24 @@ def draw_plane(frame: RunFrame, options: Any) -> np.ndarray:
     bar = figure.colorbar(cells, label=shown.label, location=place, shrink=0.8, pad=0.02)
     bar.formatter.set_powerlimits((-3, 4))
     return _image(figure)
+
+
+def draw_curves(columns: Sequence[tuple[str, np.ndarray]], path: Path, title: str) -> None:
+    """The columns after the first over the first, each with its label, (k,) each, as a PNG.
+
+    Raises:
+        ModuleNotFoundError: matplotlib is not installed.
+    """
+    figure = matplotlib_figure((800, 500))
+    axes = figure.add_subplot()
+    (across, x), curves = columns[0], columns[1:]
+    for label, y in curves:
+        axes.plot(x, y, lw=1.2, label=label)
+    axes.set(xlabel=across, ylabel=curves[0][0] if len(curves) == 1 else "", title=title)
+    if len(curves) > 1:
+        axes.legend()
+    axes.grid(alpha=0.3)
+    figure.savefig(path)
 
 
 def _title(frame: RunFrame, options: Any) -> str:

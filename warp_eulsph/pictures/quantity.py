@@ -50,7 +50,7 @@ def quantity(frame: RunFrame, name: str) -> Quantity:
         ValueError: no such field or component in the frame.
     """
     field, _, component = name.partition(".")
-    units = {**frame.units, **DERIVED}
+    units = {**DERIVED, **frame.units}
     try:
         values = np.asarray(frame.field(field), dtype=float)
     except KeyError:

@@ -43,7 +43,6 @@ class Balance(Correction):
 
     sweeps: int = 5
     bound: float = 0.25
-    by_body = True
     has_potentials = True
 
     def __post_init__(self) -> None:
@@ -52,9 +51,9 @@ class Balance(Correction):
         if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
             raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.25 is the tested value")
 
-    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "BalancedPairs":
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "BalancedPairs":
         """Allocate."""
-        return BalancedPairs(self, space, particles, moving, device)
+        return BalancedPairs(self, space, particles, device)
 
 
 @functools.cache
@@ -166,10 +165,9 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    def __init__(self, option: Balance, space: Space, particles: Any, moving: list[range], device: Any):
+    def __init__(self, option: Balance, space: Space, particles: Any, device: Any):
         super().__init__(space, device)
         self.option, self.particles, n = option, particles, len(particles.mass)
-        self._balanced, self._moving = [range(n)], moving  # all at the start, then those that move
         self.torn = wp.full(1, WELL, dtype=wp.int32, device=device)
         self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
 
@@ -180,18 +178,14 @@ class BalancedPairs(UpwindForces):
     def refresh(self, configuration: Configuration, state: Any) -> None:
         """Balance the new reference."""
         reference, near, simd = configuration.fields, configuration.near, configuration.simd
+        n, K = len(self.psi), configuration.K
         configuration.defect(state.surface, self.defect)
-        self._over(_make_renew(self.space), [reference, self.defect, state.surface, self.torn])
+        self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface, self.torn])
         for sweep in range(self.option.sweeps):
             old, new = self.psi, self._other
             if (self.option.sweeps - sweep) % 2:  # the last sweep writes ψ, the others take turns
                 old, new = new, old
-            arguments = [reference, near, configuration.K, self.defect, old, new]
-            self._over(_make_relax(self.space, simd, sweep == 0), arguments)
-        self._over(_make_shift(self.space), [self.particles, reference, self.psi, self.option.bound])
-        self._over(_make_correct(self.space, simd), [reference, near, configuration.K, configuration.poor])
-        self._balanced = self._moving
-
-    def _over(self, kernel: Any, arguments: list[Any]) -> None:
-        for body in self._balanced:
-            self._launch(kernel, len(body), arguments, body.start)
+            arguments = [reference, near, K, self.defect, old, new]
+            self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
+        self._launch(_make_shift(self.space), n, [self.particles, reference, self.psi, self.option.bound])
+        self._launch(_make_correct(self.space, simd), n, [reference, near, K, configuration.poor])

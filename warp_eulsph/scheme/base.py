@@ -9,6 +9,7 @@ from .shifting import Shifting
 from .smoothing import Smoothing
 from .stabiliser import Correction
 from .tie import Tie
+from .tilt import Tilt
 
 if TYPE_CHECKING:
     from .stepper import Stepper
@@ -28,6 +29,7 @@ class Scheme(ABC):
     limiter: FluxCorrectedTransport | None = None
     shifting: Shifting | None = None
     tie: Tie | None = None
+    tilt: Tilt | None = None
     #: Tested Courant number.
     cfl: ClassVar[float]
 

@@ -146,11 +146,11 @@ def _make_carry_history(space: Space, law: Law) -> Any:
     mat, row, Constants, kept = space.mat, space.row(law.history), law.Constants, law.carry
 
     @wp.kernel(module="unique", enable_backward=False)
-    def carry_history(first: int, F: wp.array(dtype=mat), history: wp.array(dtype=row), c: Constants):
-        i = wp.tid()
-        F_a, history_a = kept(F[first + i], history[i], c)
-        F[first + i] = F_a
-        history[i] = history_a
+    def carry_history(first: int, begin: int, F: wp.array(dtype=mat), history: wp.array(dtype=row), c: Constants):
+        a = first + wp.tid()
+        F_a, history_a = kept(F[a], history[a - begin], c)
+        F[a] = F_a
+        history[a - begin] = history_a
 
     return carry_history
 
@@ -201,7 +201,7 @@ class Flux:
             history = wp.zeros(count, dtype=space.row(law.history), device=device) if law.history else None
             self.parts.append(_Part(first, count, law, constants, history))
             first += count
-        self.fields = allocate(space, "Flux", first, device, empty=("Pi", "tie"))
+        self.fields = allocate(space, "Flux", first, device, empty=("Pi", "tie", "drag"))
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.histories = [part.history for part in self.parts]
 
@@ -219,7 +219,7 @@ class Flux:
         found = []
         for part in self.parts:
             out = wp.zeros(1, dtype=self.space.row(2), device=self.device)
-            wp.launch(_make_moduli(self.space, part.law), 1, [part.constants, out], device=self.device)
+            self._launch.once(_make_moduli(self.space, part.law), 1, [part.constants, out])
             found.append((float(out.numpy()[0, 0]), float(out.numpy()[0, 1])))
         return found
 
@@ -252,4 +252,4 @@ class Flux:
                 self._launch(_make_carry(self.space, part.law), part.size, [F, part.constants], part.first)
             else:
                 arguments = [part.first, F, part.history, part.constants]
-                self._launch.once(_make_carry_history(self.space, part.law), part.size, arguments)
+                self._launch(_make_carry_history(self.space, part.law), part.size, arguments, part.first)

@@ -10,13 +10,16 @@ from typing import Any
 
 import warp as wp
 
+from ..boundaries import Bound
+from ..interactions import BoundInteraction
 from .refresh import ByGraph
 from .stepper import Stepper
 
 
 def recordable(stepper: Stepper) -> bool:
     """Whether steps launch kernels only: conditions given as Python functions need the host in every step."""
-    return all(condition.recordable for condition in stepper.conditions)
+    parts: list[Bound | BoundInteraction] = [*stepper.conditions, *stepper.interactions]
+    return all(part.recordable for part in parts)
 
 
 class StepGraphs:
@@ -37,6 +40,7 @@ class StepGraphs:
             stepper.step()
             self._taken.add(due)
             return
+        self._forget_old_lists()
         clock.open_batch()
         launched, batch = 0, []
         while due in self._taken:
@@ -50,14 +54,16 @@ class StepGraphs:
         stepper.steps += taken
         if taken < launched and any(medium.configuration.lists.waiting for medium in stepper.media):
             stepper.finish_refresh(batch[taken])
-            stepper.advance()
+            stepper.move_on()
             stepper.steps += 1
 
-    def _graph(self, due: tuple[int, ...]) -> Any:
+    def _forget_old_lists(self) -> None:
         lists = [medium.configuration.near.index for medium in self.stepper.media]
         if len(lists) != len(self._lists) or any(a is not b for a, b in zip(lists, self._lists, strict=True)):
             self._graphs.clear()
             self._lists = lists
+
+    def _graph(self, due: tuple[int, ...]) -> Any:
         if due not in self._graphs:
             with wp.ScopedCapture(self.stepper.device) as capture:
                 self._record(due)
@@ -68,4 +74,4 @@ class StepGraphs:
         stepper, running = self.stepper, self.stepper.clock.fields.running
         if due:
             stepper.refresh(due, ByGraph(running))
-        wp.capture_if(running, stepper.advance)
+        wp.capture_if(running, stepper.move_on)

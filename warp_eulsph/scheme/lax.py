@@ -44,8 +44,8 @@ def _make_note(space: Space) -> Any:
     vec = space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
-    def note(v: wp.array(dtype=vec), smoothed: wp.array(dtype=vec), dv: wp.array(dtype=vec)):
-        a = wp.tid()
+    def note(first: int, v: wp.array(dtype=vec), smoothed: wp.array(dtype=vec), dv: wp.array(dtype=vec)):
+        a = first + wp.tid()
         dv[a] = smoothed[a] - v[a]
 
     return note
@@ -58,8 +58,8 @@ def _make_adopt(space: Space) -> Any:
     State, Clock = structure(space, "State"), clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def adopt(clock: Clock, state: State, other: State, dv: wp.array(dtype=vec)):
-        a = wp.tid()
+    def adopt(first: int, clock: Clock, state: State, other: State, dv: wp.array(dtype=vec)):
+        a = first + wp.tid()
         if clock.dt[0] == wp.float64(0.0):
             other.v[a] = state.v[a]
             dv[a] = vec()
@@ -109,7 +109,7 @@ class LaxStepper(Stepper):
         self.clock.tick()
 
     def _note_smoothing(self, U: Any, other: Any) -> None:
-        wp.launch(_make_note(self.space), self.n, [U.v, other.v, self.dv], device=self.device)
+        self._launch(_make_note(self.space), self.n, [U.v, other.v, self.dv])
 
     def _adopt(self, U: Any, other: Any) -> None:
-        wp.launch(_make_adopt(self.space), self.n, [self.clock.fields, U, other, self.dv], device=self.device)
+        self._launch(_make_adopt(self.space), self.n, [self.clock.fields, U, other, self.dv])

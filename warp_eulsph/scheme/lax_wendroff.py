@@ -12,6 +12,7 @@ from .smoothing import Smoothing
 from .stabiliser import Correction
 from .stepper import Stepper
 from .tie import Tie
+from .tilt import Tilt
 from .world import Parts
 
 
@@ -29,6 +30,8 @@ class LaxWendroff(Scheme):
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
         shifting: what keeps moving arrangements even (M15), with Balance() only; None shifts nothing.
         tie: what ties positions to F where the arrangement does not move (M16); None is the paper's.
+        tilt: what pair weights are multiplied by near free faces, where the arrangement does not move (M17); None is
+            the paper's.
     """
 
     smoothing: Smoothing | None = None
@@ -37,6 +40,7 @@ class LaxWendroff(Scheme):
     limiter: FluxCorrectedTransport | None = None
     shifting: Shifting | None = None
     tie: Tie | None = None
+    tilt: Tilt | None = None
     #: Tested Courant number; the limit is 0.5 in bounded 3-D bodies.
     cfl: ClassVar[float] = 0.4
 

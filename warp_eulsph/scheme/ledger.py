@@ -11,23 +11,41 @@ from ..execution import Launcher
 from ..fields import clock_structure, part_of, structure
 from ..reduce import Sum, SumOfParticles
 from ..space import Space, matrix_type, vector_type
+from .exchanges import Exchanges
 from .medium import Medium
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
-ACCOUNTS = ("external", "constraint", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
+ACCOUNTS = ("external", "constraint", "damping", "dissipation", "correction", "tie", "limiter", "stepping", "shifting")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
 @functools.cache
-def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> Any:
+def _loads_power(space: Space, damped: bool) -> Any:
+    """``wp.func`` (power of the loads on a particle at velocity v, power of what damps among them) [W]."""
+    Forces, precise = structure(space, "Forces"), vector_type(space.dim, wp.float64)
+
+    @wp.func
+    def loads_power(a: int, forces: Forces, v: precise) -> wp.vec2d:
+        loads, damping = precise(forces.external[a]), wp.float64(0.0)
+        if wp.static(damped):
+            loads -= precise(forces.damping[a])
+            damping = wp.dot(precise(forces.damping[a]), v)
+        return wp.vec2d(wp.dot(loads, v), damping)
+
+    return loads_power
+
+
+@functools.cache
+def _make_entries(space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, damped: bool) -> Any:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
     two-step scheme itself gains: ΔW − Δt V Q:∇v^{n+½} + Δt f_int·(v̄ − v^{n+½}), zero for an exact time integration.
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
-    The tie's is the power of its force and of its stress, which Q holds and W does not (M16).
+    The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
+    where it has a stress (M9).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -37,7 +55,7 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
     Flux = structure(space, "Flux")
-    precise = vector_type(space.dim, wp.float64)
+    precise, power_of = vector_type(space.dim, wp.float64), _loads_power(space, damped)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -61,32 +79,35 @@ def _make_entries(space: Space, tied: bool, limited: bool, smoothed: bool) -> An
         out: wp.array(dtype=_Entry),
     ):
         block = first + wp.tid()
-        dt = clock.dt[0]
-        total = _Entry()
+        dt, total = clock.dt[0], _Entry()
         for a in range(block * each, wp.min((block + 1) * each, n)):
-            mass = wide(particles.mass[a])
-            v = precise(state.v[a])
+            mass, v, internal = wide(particles.mass[a]), precise(state.v[a]), precise(forces.internal[a])
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
-            internal = precise(forces.internal[a])
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
             strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate)
-            tie = wide(0.0)
+            tie, limiter = wide(0.0), wide(0.0)
             if wp.static(tied):
                 tied_power = wp.ddot(precise_mat(flux.tie[a]), strain_rate)
                 strain_power -= tied_power
                 tie = dt * (wp.dot(precise(forces.tie[a]), v_mean) - tied_power)
+            dissipation = wp.dot(precise(forces.dissipation[a]), v_mean)
+            if wp.static(dragged):
+                dragged_power = wp.ddot(precise_mat(flux.drag[a]), strain_rate)
+                strain_power -= dragged_power
+                dissipation -= dragged_power
             stepping = W[a] - W_old[a] - dt * strain_power + dt * wp.dot(internal, v_mean - precise(half.v[a]))
-            limiter = wide(0.0)
             if wp.static(limited):
                 limiter = mass * wp.dot(precise(dv[a]), v_mean) + dW_limited[a]
                 stepping -= dW_limited[a]
             if wp.static(smoothed):
                 stepping += mass * wp.dot(precise(dv[a]), v_mean)
+            loads = power_of(a, forces, v_mean)
             total += wide(particles.share[a]) * _Entry(
-                dt * wp.dot(precise(forces.external[a]), v_mean),
+                dt * loads[0],
                 wp.dot(impulse, v_mean),
-                dt * wp.dot(precise(forces.dissipation[a]), v_mean),
+                dt * loads[1],
+                dt * dissipation,
                 dt * wp.dot(precise(forces.correction[a]), v_mean),
                 tie,
                 limiter,
@@ -139,8 +160,8 @@ def _make_shift_entry(space: Space) -> Any:
 @functools.cache
 def _make_subtract() -> Any:
     @wp.kernel(module="unique", enable_backward=False)
-    def subtract(value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def subtract(first: int, value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         out[a] = value[a] - out[a]
 
     return subtract
@@ -152,8 +173,8 @@ def _make_kinetic(space: Space) -> Any:
     precise = wp.types.vector(length=space.dim, dtype=wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def kinetic(particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def kinetic(first: int, particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         v_a = precise(v[a])
         out[a] = wp.float64(0.5) * wp.float64(particles.share[a] * particles.mass[a]) * wp.dot(v_a, v_a)
 
@@ -166,8 +187,8 @@ def _make_own(space: Space) -> Any:
     Particles = structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def own(particles: Particles, value: wp.array(dtype=wp.float64)):
-        a = wp.tid()
+    def own(first: int, particles: Particles, value: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
         value[a] = value[a] * wp.float64(particles.share[a])
 
     return own
@@ -193,9 +214,21 @@ class _Page:
 
 
 class Ledger:
-    """Energy accounts on the device, booked every step in float64 and read when asked."""
+    """Energy accounts on the device, booked every step in float64 and read when asked.
 
-    def __init__(self, space: Space, particles: Any, media: Sequence[Medium], clock: DeviceClock, device: Any):
+    What interactions do has an account where there are any: their work on the bodies and what they hold themselves.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        particles: Any,
+        media: Sequence[Medium],
+        clock: DeviceClock,
+        device: Any,
+        exchanges: Exchanges | None = None,
+        damped: bool = False,
+    ):
         n = len(particles.mass)
         self.space, self.particles, self.clock, self.device = space, particles, clock, device
         self._launch = Launcher(device)
@@ -207,6 +240,7 @@ class Ledger:
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self.start, self._most = 0.0, 0.0
+        self._exchanges, self._damped = exchanges, damped
 
     def open(self, U: Any) -> None:
         """Start the books at state ``U``."""
@@ -214,11 +248,14 @@ class Ledger:
         for page in self._pages:
             page.medium.flux.energy(page.medium.of(U).F, page.W_old)
         self._total.zero_()
-        self.start = self.kinetic(U) + self.stored(U)
+        if self._exchanges is not None:
+            self._exchanges.open()
+        self.start = self.kinetic(U) + self.stored(U) + self.held()
 
     def evolving(self) -> dict[str, wp.array]:
         """The accounts and the end of the last step booked, by name; with ``start`` what a checkpoint must hold."""
-        return {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+        held = {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+        return held if self._exchanges is None else held | self._exchanges.evolving()
 
     def open_limiter(self, U: Any) -> None:
         """Note the stored energies before limiters change ``U``."""
@@ -229,7 +266,7 @@ class Ledger:
         """Note what limiters did to the stored energies."""
         for page in self._limited():
             page.medium.flux.energy(page.medium.of(U).F, page.W)
-            wp.launch(_make_subtract(), len(page.W), [page.W, page.dW_limited], device=self.device)
+            self._launch(_make_subtract(), len(page.W), [page.W, page.dW_limited])
 
     def _limited(self) -> list[_Page]:
         return [page for page in self._pages if page.medium.limiter is not None]
@@ -239,6 +276,8 @@ class Ledger:
 
         ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (particles of the medium,) of vec for each.
         """
+        if self._exchanges is not None:
+            self._exchanges.record(U, self._v_old, self._total, ACCOUNTS.index("external"))
         for k, page in enumerate(self._pages):
             medium, limiter = page.medium, page.medium.limiter
             flux = medium.flux
@@ -249,8 +288,10 @@ class Ledger:
                 dv = smoothed[k]
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
             arguments += [self.clock.fields, medium.forces]
-            tied = len(flux.fields.tie) > 0
-            self._book(page, _make_entries(self.space, tied, limiter is not None, smoothed is not None), arguments)
+            tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
+            limits, smooths = limiter is not None, smoothed is not None
+            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped)
+            self._book(page, kernel, arguments)
 
     def book_shift(self, U: Any) -> None:
         """Book what shifting did to ``U`` since the last step."""
@@ -266,7 +307,7 @@ class Ledger:
 
     def kinetic(self, U: Any) -> float:
         """Kinetic energy [J]; reads the device."""
-        wp.launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W], device=self.device)
+        self._launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
@@ -282,13 +323,22 @@ class Ledger:
     def stored(self, U: Any) -> float:
         """Stored energy [J]; reads the device."""
         self._store(U)
-        wp.launch(_make_own(self.space), len(self._W), [self.particles, self._W], device=self.device)
+        self._launch(_make_own(self.space), len(self._W), [self.particles, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
+    def held(self) -> float:
+        """Energy that interactions hold [J]; reads the device."""
+        return 0.0 if self._exchanges is None else self._exchanges.held()
+
+    def exchanged(self) -> list[float]:
+        """Energy that each interaction added since the start [J], with what it holds; reads the device."""
+        return [] if self._exchanges is None else self._exchanges.accounts()
+
     def accounts(self) -> dict[str, float]:
-        """Energy that each mechanism added since the start [J]; reads the device."""
-        return dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+        """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
+        found = dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+        return found | ({} if self._exchanges is None else {"interaction": sum(self.exchanged())})
 
     def made(self) -> float:
         """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""
@@ -299,4 +349,4 @@ class Ledger:
 
     def residual(self, U: Any) -> float:
         """Energy that no account explains [J]; round-off if the operators are duals of each other."""
-        return self.kinetic(U) + self.stored(U) - self.start - sum(self.accounts().values())
+        return self.kinetic(U) + self.stored(U) + self.held() - self.start - sum(self.accounts().values())

@@ -6,6 +6,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..operators.values import Shepard, Values
 from ..space import Space
@@ -48,13 +49,14 @@ def _make_strength(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def strength(
+        first: int,
         particles: Particles,
         lumped: wp.array(dtype=real),
         consistent: wp.array(dtype=real),
         d: wp.array(dtype=vec),
         sd: wp.array(dtype=vec),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         others = lumped[a] - consistent[a]
         sd_a = vec()
         if others > real(LEAST_SHARE) * lumped[a]:
@@ -70,8 +72,8 @@ def _make_times_mass(space: Space, components: int) -> Any:
     Particles = structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def times_mass(particles: Particles, f: wp.array(dtype=row)):
-        a = wp.tid()
+    def times_mass(first: int, particles: Particles, f: wp.array(dtype=row)):
+        a = first + wp.tid()
         f[a] = f[a] * particles.mass[a]
 
     return times_mass
@@ -98,8 +100,8 @@ def _make_weigh(space: Space, components: int) -> Any:
     scale = by_direction(space, components)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def weigh(sd: wp.array(dtype=vec), f: wp.array(dtype=row), out: wp.array(dtype=row)):
-        a = wp.tid()
+    def weigh(first: int, sd: wp.array(dtype=vec), f: wp.array(dtype=row), out: wp.array(dtype=row)):
+        a = first + wp.tid()
         out[a] = scale(sd[a], f[a])
 
     return weigh
@@ -118,6 +120,7 @@ def _make_increment(space: Space, components: int, conservative: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def increment(
+        first: int,
         particles: Particles,
         lumped: wp.array(dtype=real),
         sd: wp.array(dtype=vec),
@@ -127,7 +130,7 @@ def _make_increment(space: Space, components: int, conservative: bool) -> Any:
         mixed_weighed: wp.array(dtype=row),
         out: wp.array(dtype=row),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         f_a = f[a]
         change = scale(sd[a], mixed[a] - f_a * lumped[a])
         if wp.static(conservative):
@@ -144,8 +147,8 @@ def _make_add(space: Space) -> Any:
     State, Clock = structure(space, "State"), clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def add(clock: Clock, dv: wp.array(dtype=vec), dF: wp.array(dtype=mat), state: State):
-        a = wp.tid()
+    def add(first: int, clock: Clock, dv: wp.array(dtype=vec), dF: wp.array(dtype=mat), state: State):
+        a = first + wp.tid()
         if clock.dt[0] == wp.float64(0.0):
             dv[a] = vec()
             dF[a] = mat()
@@ -171,7 +174,7 @@ class MassDiffusion:
         device: Any,
     ):
         self.option, self.space, self.particles, self.device = option, space, particles, device
-        self.configuration = configuration
+        self.configuration, self._launch = configuration, Launcher(device)
         n = len(particles.mass)
         self.lumped, self.consistent = (wp.zeros(n, dtype=space.real, device=device) for _ in range(2))
         self.dv = wp.zeros(n, dtype=space.vec, device=device)
@@ -181,6 +184,7 @@ class MassDiffusion:
             components: [wp.zeros(n, dtype=space.row(components), device=device) for _ in range(3)]
             for components in {space.dim, space.dim**2}
         }
+        self._views: dict[int, tuple[wp.array, wp.array]] = {}
 
     def refresh(self) -> None:
         """The mass matrices' diagonals on a new reference."""
@@ -190,7 +194,7 @@ class MassDiffusion:
     def prepare(self, U: Any, d: wp.array) -> None:
         """Increments d × diffusion of the state ``U`` = Uⁿ, (n,) of vec ``d`` from the sensor."""
         strength = [self.particles, self.lumped, self.consistent, d, self._sd]
-        wp.launch(_make_strength(self.space), len(d), strength, device=self.device)
+        self._launch(_make_strength(self.space), len(d), strength)
         if self.option.conservative:
             self._mix(self._sd, self._scratch[self.space.dim][0], self._mixed_sd)
         for f, increment in ((U.v, self.dv), (U.F, self.dF)):
@@ -198,26 +202,28 @@ class MassDiffusion:
 
     def apply(self, U: Any, clock: Any) -> None:
         """Add the increments to ``U``."""
-        wp.launch(_make_add(self.space), len(self.dv), [clock, self.dv, self.dF, U], device=self.device)
+        self._launch(_make_add(self.space), len(self.dv), [clock, self.dv, self.dF, U])
 
     def _diffuse(self, f: wp.array, out: wp.array) -> None:
         components = wp.types.type_size(f.dtype)
         first, mixed, mixed_weighed = self._scratch[components]
         self._mix(f, first, mixed)
         if self.option.conservative:
-            wp.launch(_make_weigh(self.space, components), len(f), [self._sd, f, out], device=self.device)
+            self._launch(_make_weigh(self.space, components), len(f), [self._sd, f, out])
             self._mix(out, first, mixed_weighed)
         kernel = _make_increment(self.space, components, self.option.conservative)
         arguments = [self.particles, self.lumped, self._sd, self._mixed_sd, f, mixed, mixed_weighed, out]
-        wp.launch(kernel, len(f), arguments, device=self.device)
+        self._launch(kernel, len(f), arguments)
 
     def _mix(self, f: wp.array, between: wp.array, out: wp.array) -> None:
         """``out`` ← M^C f = Nᵀ diag(m) N f."""
         self.interpolation.apply(f, between)
         kernel = _make_times_mass(self.space, wp.types.type_size(f.dtype))
-        wp.launch(kernel, len(f), [self.particles, between], device=self.device)
+        self._launch(kernel, len(f), [self.particles, between])
         self.interpolation.transpose(between, out)
 
     def _rows(self, f: wp.array) -> wp.array:
-        """The same memory with each element as one row of reals."""
-        return f.view(self.space.row(wp.types.type_size(f.dtype)))
+        """The same memory with each element as one row of reals; the same object each time, as launches want it."""
+        if id(f) not in self._views:
+            self._views[id(f)] = f, f.view(self.space.row(wp.types.type_size(f.dtype)))
+        return self._views[id(f)][1]

@@ -13,14 +13,15 @@ from ..fields import part, part_of
 from ..space import Space
 from .base import Scheme
 from .dissipation import UpwindForces
+from .dual_forces import DualForces
 from .flux import Flux
 from .limiter import MassDiffusion
+from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
 from .shifting import Shifter
 from .stabiliser import Stabiliser
-from .tie import TiedPairs
 from .updates import make_drift, make_kick, make_predict
 
 
@@ -35,8 +36,8 @@ class MediumParts:
         particles: struct ``Particles`` of them.
         flux: of its bodies.
         configuration: its reference k.
-        moving: whether the arrangement of each of its bodies moves with the reference.
         surface_given: the bodies came with their area vectors.
+        groups: number of each body, equal for those that are bonded to each other.
     """
 
     options: Scheme
@@ -45,13 +46,19 @@ class MediumParts:
     particles: Any
     flux: Flux
     configuration: Configuration
-    moving: Sequence[bool]
     surface_given: bool
+    groups: Sequence[int]
 
 
 def is_corrected(options: Scheme, policy: ReferencePolicy, surface_given: bool) -> bool:
     """Whether the scheme's correction is at work: a fixed reference needs it only where surface vectors were given."""
     return options.correction is not None and (surface_given or not policy.fixed)
+
+
+def _check_bonds(groups: Sequence[int], per_body: bool, who: str) -> None:
+    """Raise ValueError where bodies are bonded and something closes its sums body by body."""
+    if per_body and len(set(groups)) < len(groups):
+        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance(), and no shifting")
 
 
 def _held(conditions: Sequence[Bound], span: range) -> np.ndarray:
@@ -65,7 +72,7 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
-        stabiliser: of its reference. tie, limiter, shifter: None where the options have none.
+        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
         particles, forces, grad_v: of its own particles, views of what the world has.
     """
 
@@ -74,27 +81,25 @@ class Medium:
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
-        options, n, moving = self.options, self.n, list(parts.moving)
-        bodies = [body for body, moves in zip(self.flux.bodies, moving, strict=True) if moves]
+        options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
+            _check_bonds(parts.groups, True, "shifting")
             held = _held(conditions, self.span)
-            self.shifter = options.shifting.build(space, self.particles, self.flux, bodies, held, device)
+            self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
-        self.stabiliser: Stabiliser = UpwindForces(space, device)
+        plain = self.configuration.plain
+        self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
-            if 0 < len(bodies) < len(moving) and not options.correction.by_body:
-                raise ValueError(
-                    f"correction must be Balance() or None where some bodies move and others do not, got "
-                    f"{options.correction}; arrangement=Current() moves all"
-                )
-            self.stabiliser = options.correction.build(space, self.particles, self.flux, bodies, device)
-        self.tie: TiedPairs | None = None
-        if options.tie is not None:
-            self.tie = options.tie.build(space, self.flux, moving, device)
+            _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
+            self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
+        self.pairs: PairPotentials | None = None
+        if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
+            simd = self.configuration.simd and not sensed
+            self.pairs = PairPotentials(options.tie, plain, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
         self.limiter: MassDiffusion | None = None
@@ -107,17 +112,22 @@ class Medium:
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
 
-    def join(self, states: Sequence[Any], forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
-        """See the own particles of the world's ``states``, of ``forces`` and of ∇v, by its ``clock``."""
-        self._views = [(state, part(self.space, state, "State", self.span)) for state in states]
+    def join(self, U: Any, half: Any, forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
+        """See the own particles of the world's two states, of ``forces`` and of ∇v, by its ``clock``."""
+        self._whole, self._own = U, part(self.space, U, "State", self.span)
+        self._own_half = part(self.space, half, "State", self.span)
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
 
     def of(self, state: Any) -> Any:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
-        return next(view for whole, view in self._views if whole is state)
+        return self._own if state is self._whole else self._own_half
 
     # the reference
+
+    def due(self, step: int, state: Any) -> bool:
+        """Whether the reference is to be refreshed before step number ``step``."""
+        return not self.policy.fixed and self.policy.due(step, self.configuration, self.of(state).F)
 
     def start(self, state: Any) -> None:
         """Make ``state`` the first reference."""
@@ -156,8 +166,8 @@ class Medium:
             U = self.of(state)
             self.velocity_gradient(state)
             self.configuration.gradient(self._rows(U.F), self.grad_F)
-            potentials = self.stabiliser.psi  # type: ignore[attr-defined]
-            self.shifter.apply(self.configuration.fields, potentials, U, self.grad_v, self.grad_F, self.clock)
+            psi = self.stabiliser.psi
+            self.shifter.apply(self.configuration.fields, psi, U, self.grad_v, self.grad_F, self.clock)
 
     # the lines of a step
 
@@ -195,8 +205,8 @@ class Medium:
             epsilon = options.dissipation.epsilon
             if options.dissipation.sensor is not None:
                 d = self.sensors[options.dissipation.sensor].d
-        if self.tie is not None:
-            self.tie.compute(self.configuration, at, self.forces)
+        if self.pairs is not None:
+            self.pairs.compute(self.configuration, at, v, self.grad_v, epsilon, d, self.forces)
         arguments = (self.configuration, self.flux.fields, at.x, v, self.grad_v, epsilon, d, self.forces)
         self.stabiliser.compute(*arguments)
 

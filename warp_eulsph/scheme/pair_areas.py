@@ -7,6 +7,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..operators.laplacian import LaplacianSolver
 from ..reduce import Sum
@@ -29,6 +30,7 @@ class PairAreas(Correction):
 
     kappa: float = 1.0
     iterations: int = 5
+    per_body = True
 
     def __post_init__(self) -> None:
         if not self.kappa >= 0.0:
@@ -41,7 +43,7 @@ class PairAreas(Correction):
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "ClosedPairs":
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "ClosedPairs":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return ClosedPairs(self, space, particles, flux.bodies, device)
 
@@ -86,6 +88,7 @@ def _make_dissipate(space: Space, sensed: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate_and_budget(
+        first: int,
         reference: Reference,
         near: Neighbours,
         flux: Flux,
@@ -99,7 +102,7 @@ def _make_dissipate(space: Space, sensed: bool) -> Any:
         out: wp.array(dtype=vec),
         admission: wp.array(dtype=real),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         x_a, V_a, v_a, grad_a = reference.x[a], reference.V[a], v[a], grad_v[a]
         Z_a, Z_shear_a, Q_a, psi_a = flux.impedance[a], flux.shear_impedance[a], flux.Q[a], psi[a]
         dissipation = vec()
@@ -138,6 +141,7 @@ def _make_correct(space: Space, limited: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def correct(
+        first: int,
         reference: Reference,
         near: Neighbours,
         Q: wp.array(dtype=mat),
@@ -146,7 +150,7 @@ def _make_correct(space: Space, limited: bool) -> Any:
         admission: wp.array(dtype=real),
         out: wp.array(dtype=vec),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         V_a, v_a, Q_a, psi_a = reference.V[a], v[a], Q[a], psi[a]
         correction = vec()
         for k in range(near.start[a], near.start[a + 1]):
@@ -165,7 +169,7 @@ class ClosedPairs(Stabiliser):
 
     def __init__(self, option: PairAreas, space: Space, particles: Any, bodies: list[range], device: Any):
         self.option, self.space, self.bodies, self.device = option, space, bodies, device
-        self.upwind = UpwindForces(space, device)
+        self.upwind, self._launch = UpwindForces(space, device), Launcher(device)
         self.solver = LaplacianSolver(space, len(particles.mass), device)
         self.admission = wp.zeros(len(particles.mass), dtype=space.real, device=device)
         self._sum, self._total = (
@@ -179,8 +183,8 @@ class ClosedPairs(Stabiliser):
         configuration.defect(state.surface, defect)
         for body in self.bodies:
             self._sum(defect[body.start : body.stop], self._total)
-            arguments = [body.start, len(body), self._total, defect]
-            wp.launch(_make_remove_mean(self.space), len(body), arguments, device=self.device)
+            arguments = [len(body), self._total, defect]
+            self._launch(_make_remove_mean(self.space), len(body), arguments, body.start)
             self.solver.solve(configuration.fields, configuration.near, body, self.option.iterations)
 
     def evolving(self) -> dict[str, wp.array]:
@@ -204,9 +208,9 @@ class ClosedPairs(Stabiliser):
             arguments = [configuration.fields, configuration.near, flux, x, v, grad_v, epsilon]
             arguments += [sensor if sensor is not None else v, self.solver.psi, self.option.kappa]
             arguments += [forces.dissipation, self.admission]
-            wp.launch(_make_dissipate(self.space, sensor is not None), len(v), arguments, device=self.device)
+            self._launch(_make_dissipate(self.space, sensor is not None), len(v), arguments)
         else:
             self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
         arguments = [configuration.fields, configuration.near, flux.Q, v, self.solver.psi, self.admission]
         arguments += [forces.correction]
-        wp.launch(_make_correct(self.space, self.option.limited), len(v), arguments, device=self.device)
+        self._launch(_make_correct(self.space, self.option.limited), len(v), arguments)

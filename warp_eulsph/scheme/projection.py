@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import structure
 from ..reduce import Sum
 from ..space import Space
@@ -35,13 +36,14 @@ def _make_sums(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def share_in_sums(
+        first: int,
         particles: Particles,
         positions: wp.array(dtype=vec),
         forces: wp.array(dtype=vec),
         couples: wp.array(dtype=wp.vec3d),
         sums: wp.array(dtype=_Sums),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         own = wp.float64(particles.share[a])
         m = own * wp.float64(particles.mass[a])
         x = padded(positions[a])
@@ -107,7 +109,7 @@ class Projection:
     """
 
     def __init__(self, space: Space, particles: Any, bodies: list[range], device: Any):
-        n = len(particles.mass)
+        n, self._launch = len(particles.mass), Launcher(device)
         self.space, self.particles, self.bodies, self.device = space, particles, bodies, device
         self.couples = wp.zeros(n, dtype=wp.vec3d, device=device)
         self._each = wp.zeros(n, dtype=_Sums, device=device)
@@ -116,8 +118,7 @@ class Projection:
     def __call__(self, x: wp.array, forces: wp.array) -> None:
         """Change ``forces`` [N] at positions ``x`` [m], both (n,) of vec, in place."""
         arguments = [self.particles, x, forces, self.couples, self._each]
-        wp.launch(_make_sums(self.space), len(forces), arguments, device=self.device)
+        self._launch(_make_sums(self.space), len(forces), arguments)
         for body in self.bodies:
             self._sum(self._each[body.start : body.stop], self._total)
-            arguments = [body.start, self.particles, x, self._total, forces]
-            wp.launch(_make_project(self.space), len(body), arguments, device=self.device)
+            self._launch(_make_project(self.space), len(body), [self.particles, x, self._total, forces], body.start)

@@ -1,17 +1,17 @@
 """The reference configuration k: positions, volumes, corrections and neighbour lists in which weights live."""
 
 import functools
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from ..execution import Launcher, simd
+from ..atomics import raise_to
+from ..execution import Launcher, launch, simd
 from ..fields import allocate, arrays, neighbour_structure, structure
 from ..linalg import det, inverse, largest_shortening, stretch_bounds, stretch_of_volume, symmetric_bounds
 from ..operators.correction import make_correct, make_pair_sums, make_pair_sums_simd
-from ..operators.divergence import make_divergence
+from ..operators.divergence import make_divergence, make_tilted_divergence
 from ..operators.gradient import make_gradient
 from ..operators.interpolation import Interpolation
 from ..operators.neighbours import NeighbourLists
@@ -19,6 +19,7 @@ from ..operators.values import Values
 from ..space import Space, difference
 from ..weights import Weight
 from .refresh import BY_HOST
+from .tilt import Tilt, make_tilt, make_tilted_sums
 
 # The smoothing length follows the volume between these, so that one particle cannot make the lists endless.
 LEAST_GROWTH, LARGEST_GROWTH = 0.5, 2.0
@@ -99,12 +100,13 @@ def _make_distortion(space: Space) -> Any:
     real, mat = space.real, space.mat
     Reference = structure(space, "Reference")
     invert, bounds, shortening_of = inverse(space), stretch_bounds(space), largest_shortening(space)
+    raise_largest = raise_to(real)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def distortion(F: wp.array(dtype=mat), reference: Reference, largest: wp.array(dtype=real)):
-        a = wp.tid()
+    def distortion(first: int, F: wp.array(dtype=mat), reference: Reference, largest: wp.array(dtype=real)):
+        a = first + wp.tid()
         G = F[a] @ invert(reference.F[a])
-        wp.atomic_max(largest, 0, wp.sqrt(wp.max(bounds(G)[1], shortening_of(G))))
+        raise_largest(largest, wp.sqrt(wp.max(bounds(G)[1], shortening_of(G))))
 
     return distortion
 
@@ -115,8 +117,8 @@ def _make_nearest(space: Space) -> Any:
     Reference, Neighbours, separation = structure(space, "Reference"), neighbour_structure(space), difference(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def find_nearest(reference: Reference, near: Neighbours, nearest: wp.array(dtype=real)):
-        a = wp.tid()
+    def find_nearest(first: int, reference: Reference, near: Neighbours, nearest: wp.array(dtype=real)):
+        a = first + wp.tid()
         least = real(wp.inf)
         for k in range(near.start[a], near.start[a + 1]):
             least = wp.min(least, wp.length(separation(reference.x[near.index[k]], reference.x[a], near.box)))
@@ -141,14 +143,12 @@ def _make_defect(space: Space) -> Any:
 class Configuration:
     """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
 
-    Nothing in it moves (``fixed``) where ``moving`` is empty.
-
     Args:
         box: lengths of the periodic box [m], zero where open.
-        moving: the particles whose arrangement a refresh reads anew, all by default; the others keep that of the
-            start, F_k = I.
+        fixed: it is that of the start for good, F_k = I.
         corrected: something changes L or the pair vectors after M3 (M10 to M13). Where nothing does and the reference
-            is fixed, arrays of the same values are one.
+            is fixed (``plain``), arrays of the same values are one.
+        tilt: of the weights (M17), where the reference is plain.
 
     Attributes:
         fields: struct ``Reference`` of ``fields.py``.
@@ -165,21 +165,22 @@ class Configuration:
         box: Any,
         device: Any,
         *,
-        moving: Sequence[range] | None = None,
+        fixed: bool = False,
         corrected: bool = True,
+        tilt: Tilt | None = None,
     ):
         n = len(particles.mass)
         self.space, self.weight, self.particles, self.device = space, weight, particles, device
-        fixed = moving is not None and not moving
-        self.fixed, self._plain = fixed, fixed and not corrected
-        self._adopting: Sequence[range] = [range(n)]  # all at the start, then those that move
-        self._moving = [range(n)] if moving is None else moving
+        self.fixed, self.plain = fixed, fixed and not corrected
+        self.tilt = tilt if self.plain else None
         self.simd, self._launch = simd(device), Launcher(device)
-        self.fields = allocate(space, "Reference", n, device, empty=("F",) if fixed else ("resolution",))
-        if self._plain:
+        empty = {"F" if fixed else "resolution"} | (set() if self.tilt else {"moment"})
+        self.fields = allocate(space, "Reference", n, device, empty=empty)
+        if self.plain:
             self.fields.balanced = self.fields.x
-        self.lists = NeighbourLists(space, weight, self.fields.h, particles.body, box, device)
-        self.K = self.fields.L if self._plain else wp.zeros(n, dtype=space.mat, device=device)
+        tilted = self.tilt is not None
+        self.lists = NeighbourLists(space, weight, self.fields.h, particles.group, box, device, tilted)
+        self.K = self.fields.L if self.plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
         self._interpolations: dict[Values, Interpolation] = {}
@@ -195,10 +196,7 @@ class Configuration:
 
     def move(self, state: Any) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
-        for body in self._adopting:
-            arguments = [state, self.particles, self.fields]
-            self._launch(_make_adopt(self.space, self.fixed), len(body), arguments, body.start)
-        self._adopting = self._moving
+        self._launch(_make_adopt(self.space, self.fixed), len(self.K), [state, self.particles, self.fields])
         self.lists.count_neighbours(self.fields.x)
 
     def renew(self) -> None:
@@ -211,10 +209,11 @@ class Configuration:
     def evolving(self) -> dict[str, wp.array]:
         """The reference's arrays by name: what a checkpoint must hold; ``rebuild`` derives the rest from them."""
         held = arrays(self.fields, "Reference")
-        held.pop("Reference.resolution")
+        for derived in ("resolution", "moment"):
+            held.pop(f"Reference.{derived}")
         if self.fixed:
             held.pop("Reference.F")
-        if self._plain:
+        if self.plain:
             held.pop("Reference.balanced")
         return held
 
@@ -231,12 +230,18 @@ class Configuration:
             self.lists.release()
 
     def _correct(self) -> None:
-        arguments = [self.K, self.fields, self.poor]
-        self._launch(make_correct(self.space), len(self.K), arguments)
+        n, space = len(self.K), self.space
+        self._launch(make_correct(space), n, [self.K, self.fields, self.poor])
+        if self.tilt is not None:
+            tilt = wp.zeros(n, dtype=space.vec, device=self.device)
+            self._launch(_make_resolve(space), n, [self.particles, self.fields])  # by L without tilt
+            arguments = [self.particles, self.fields, self.near, self.poor, self.tilt.most, tilt]
+            self._launch(make_tilt(space), n, arguments)
+            self._launch(make_tilted_sums(space), n, [self.fields, self.near, tilt])
 
     def resolve(self) -> None:
         """Once L is what it stays: what the Courant number counts by, kept where the reference is fixed."""
-        if self.fixed:
+        if self.fixed and self.tilt is None:
             self._launch(_make_resolve(self.space), len(self.K), [self.particles, self.fields])
 
     def _weigh(self) -> None:
@@ -266,7 +271,8 @@ class Configuration:
         """
         if len(Pi) != len(out):
             raise ValueError(f"Pi must be of {len(out)} particles, got {len(Pi)}; Flux.keep_dual() has it computed")
-        self._launch(make_divergence(self.space, self.simd), len(out), [self.fields, self.near, Pi, out])
+        kernel = make_divergence(self.space, self.simd) if self.tilt is None else make_tilted_divergence(self.space)
+        self._launch(kernel, len(out), [self.fields, self.near, Pi, out])
 
     def defect(self, surface: wp.array, out: wp.array) -> None:
         """``out`` ← e_a − s_a [m^(d−1)], (n,) of vec, for surface vectors s_a (M10).
@@ -280,11 +286,11 @@ class Configuration:
     def nearest(self) -> np.ndarray:
         """Distance of each particle to its nearest neighbour [m], (n,), inf without one; reads the device."""
         nearest = wp.zeros(len(self.poor), dtype=self.space.real, device=self.device)
-        wp.launch(_make_nearest(self.space), len(nearest), [self.fields, self.near, nearest], device=self.device)
+        launch(_make_nearest(self.space), len(nearest), [self.fields, self.near, nearest], self.device)
         return nearest.numpy()
 
     def distortion(self, F: wp.array) -> float:
         """Largest stretch or shortening of any particle since the last refresh; reads the device."""
         self._largest.zero_()
-        wp.launch(_make_distortion(self.space), len(F), [F, self.fields, self._largest], device=self.device)
+        self._launch(_make_distortion(self.space), len(F), [F, self.fields, self._largest])
         return float(self._largest.numpy()[0])

@@ -11,9 +11,11 @@ import numpy as np
 import warp as wp
 
 from ..boundaries.base import Assembly, Region
+from ..execution import Launcher
 from ..fields import allocate, structure
 from ..order import Order
 from ..space import Space
+from ..turns import in_turn
 from ..weights import CubicSpline, Weight
 from .reference import Configuration
 from .smoothing import NeighbourAverage, Smoothing
@@ -103,8 +105,8 @@ def _make_flux(space: Space, function: Any) -> Any:
     vec, row = space.vec, space.row(1)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def compute_flux(U: wp.array(dtype=row), out: wp.array(dtype=vec)):
-        a = wp.tid()
+    def compute_flux(first: int, U: wp.array(dtype=row), out: wp.array(dtype=vec)):
+        a = first + wp.tid()
         out[a] = function(U[a][0])
 
     return compute_flux
@@ -116,8 +118,8 @@ def _make_advance(space: Space) -> Any:
     real, mat, row = space.real, space.mat, space.row(1)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def advance(base: wp.array(dtype=row), dt: real, grad_f: wp.array(dtype=mat), out: wp.array(dtype=row)):
-        a = wp.tid()
+    def advance(first: int, base: wp.array(dtype=row), dt: real, grad_f: wp.array(dtype=mat), out: wp.array(dtype=row)):
+        a = first + wp.tid()
         out[a] = base[a] - row(dt * wp.trace(grad_f[a]))
 
     return advance
@@ -128,13 +130,14 @@ def _make_hold(space: Space) -> Any:
     row = space.row(1)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def hold(indices: wp.array(dtype=wp.int32), values: wp.array(dtype=row), U: wp.array(dtype=row)):
-        k = wp.tid()
+    def hold(first: int, indices: wp.array(dtype=wp.int32), values: wp.array(dtype=row), U: wp.array(dtype=row)):
+        k = first + wp.tid()
         U[indices[k]] = values[k]
 
     return hold
 
 
+@in_turn("run")
 class ConservationLaw:
     """A scalar conservation law on particles that do not move.
 
@@ -182,7 +185,7 @@ class ConservationLaw:
             raise ValueError(f"initial values must have shape ({n},), got {np.shape(U)}")
         self.space = space = Space(dim, dtype, periodic is not None)
         self.device, self.scheme, self.n, self.t = wp.get_device(device), scheme, n, 0.0
-        self.flux = self._function = flux
+        self.flux, self._function, self._launch = flux, flux, Launcher(device)
         if isinstance(flux, LinearAdvection):
             if len(flux.velocity) != dim:
                 raise ValueError(f"advection velocity must have {dim} components, got {flux.velocity}")
@@ -242,15 +245,15 @@ class ConservationLaw:
 
     def differentiate(self, U: wp.array) -> None:
         """∇f(U) (M4), whose trace ``advance`` takes."""
-        wp.launch(_make_flux(self.space, self._function), self.n, [U, self._flux], device=self.device)
+        self._launch(_make_flux(self.space, self._function), self.n, [U, self._flux])
         self.configuration.gradient(self._flux, self._grad_flux)
 
     def advance(self, base: wp.array, dt: float, out: wp.array) -> None:
         """``out`` ← base − Δt ∇·f of the last ``differentiate``."""
-        wp.launch(_make_advance(self.space), self.n, [base, dt, self._grad_flux, out], device=self.device)
+        self._launch(_make_advance(self.space), self.n, [base, dt, self._grad_flux, out])
 
     def hold(self, U: wp.array) -> None:
         """Give the held particles their initial value."""
         if len(self._held):
             arguments = [self._held, self._held_values, U]
-            wp.launch(_make_hold(self.space), len(self._held), arguments, device=self.device)
+            self._launch(_make_hold(self.space), len(self._held), arguments)

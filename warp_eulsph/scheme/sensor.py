@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..operators.second_derivative import make_second_derivative
 from ..space import Space
@@ -82,6 +83,7 @@ def _make_sense(space: Space, dimensionless: bool) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def sense(
+        first: int,
         reference: Reference,
         near: Neighbours,
         flux: Flux,
@@ -89,7 +91,7 @@ def _make_sense(space: Space, dimensionless: bool) -> Any:
         X: real,
         d: wp.array(dtype=vec),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         largest = wp.abs(curvature[a])
         for k in range(near.start[a], near.start[a + 1]):
             largest = wp.max(largest, wp.abs(curvature[near.index[k]]))
@@ -110,11 +112,12 @@ class SensorField:
 
     def __init__(self, option: Sensor, space: Space, particles: Any, device: Any):
         self.option, self.space, self.device, n = option, space, device, len(particles.mass)
+        self._launch = Launcher(device)
         self.d, self._curvature = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(2))
 
     def compute(self, configuration: Configuration, flux: Any, v: wp.array, grad_v: wp.array) -> None:
         """``d`` of velocities ``v`` [m/s] with gradients ``grad_v`` [1/s] and the wave speeds in ``flux``."""
         second = [configuration.fields, configuration.near, v, grad_v, self._curvature]
-        wp.launch(make_second_derivative(self.space, self.space.dim), len(v), second, device=self.device)
+        self._launch(make_second_derivative(self.space, self.space.dim), len(v), second)
         arguments = [configuration.fields, configuration.near, flux, self._curvature, self.option.X, self.d]
-        wp.launch(_make_sense(self.space, self.option.dimensionless), len(v), arguments, device=self.device)
+        self._launch(_make_sense(self.space, self.option.dimensionless), len(v), arguments)

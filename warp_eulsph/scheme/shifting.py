@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
@@ -45,15 +46,13 @@ class Shifting:
                 f"shifting bound must be in (0, 0.25] spacings, got {self.bound}; 0.05 is the tested value"
             )
 
-    def build(
-        self, space: Space, particles: Any, flux: Flux, moving: list[range], held: np.ndarray, device: Any
-    ) -> "Shifter":
+    def build(self, space: Space, particles: Any, flux: Flux, held: np.ndarray, device: Any) -> "Shifter":
         """Allocate; ``held`` are places of particles that stay, (k,).
 
         Raises:
             ValueError: a material with a history, which is not remapped.
         """
-        return Shifter(self, space, particles, flux, moving, held, device)
+        return Shifter(self, space, particles, flux, held, device)
 
 
 @functools.cache
@@ -74,6 +73,7 @@ def _make_shift(space: Space) -> Any:
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(
+        first: int,
         particles: Particles,
         reference: Reference,
         clock: Clock,
@@ -87,7 +87,7 @@ def _make_shift(space: Space) -> Any:
         impulse: wp.array(dtype=vec),
         couple: wp.array(dtype=wp.vec3d),
     ):
-        a = wp.tid()
+        a = first + wp.tid()
         delta = psi[a] * (real(0.5) * rate)
         length = wp.length(delta)
         most = bound * particles.spacing[a] * reference.h[a] / particles.h[a]
@@ -118,8 +118,8 @@ def _make_push(space: Space) -> Any:
     vec, Particles = space.vec, structure(space, "Particles")
 
     @wp.kernel(module="unique", enable_backward=False)
-    def push(particles: Particles, impulse: wp.array(dtype=vec), v: wp.array(dtype=vec)):
-        a = wp.tid()
+    def push(first: int, particles: Particles, impulse: wp.array(dtype=vec), v: wp.array(dtype=vec)):
+        a = first + wp.tid()
         v[a] = v[a] + impulse[a] / particles.mass[a]
 
     return push
@@ -134,17 +134,14 @@ class Shifter:
         space: Space,
         particles: Any,
         flux: Flux,
-        moving: list[range],
         held: np.ndarray,
         device: Any,
     ):
         if any(history is not None for history in flux.histories):
             raise ValueError("shifting cannot remap the history of a material; use shifting=None")
         self.option, self.space, self.particles, self.device = option, space, particles, device
-        n = len(particles.mass)
-        free = np.zeros(n, dtype=np.int32)
-        for body in moving:
-            free[body.start : body.stop] = 1
+        n, self._launch = len(particles.mass), Launcher(device)
+        free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
@@ -159,6 +156,6 @@ class Shifter:
         option, n = self.option, len(psi)
         arguments = [self.particles, reference, clock, psi, self.free, grad_v, grad_F, option.rate, option.bound, U]
         arguments += [self.impulse, self.projection.couples]
-        wp.launch(_make_shift(self.space), n, arguments, device=self.device)
+        self._launch(_make_shift(self.space), n, arguments)
         self.projection(U.x, self.impulse)
-        wp.launch(_make_push(self.space), n, [self.particles, self.impulse, U.v], device=self.device)
+        self._launch(_make_push(self.space), n, [self.particles, self.impulse, U.v])

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import warp as wp
 
+from ..execution import launch
 from ..operators.smoothing import make_linear_exact
 from ..operators.values import Shepard, Values
 from ..space import Space
@@ -44,7 +45,7 @@ class LinearExact(Smoothing):
     def apply(self, space: Space, configuration: Configuration, f: wp.array, gradient: wp.array, out: wp.array) -> None:
         components = wp.types.type_size(f.dtype)
         arguments = [configuration.particles, configuration.fields, configuration.near, self.theta, f, gradient, out]
-        wp.launch(make_linear_exact(space, components), len(f), arguments, device=f.device)
+        launch(make_linear_exact(space, components), len(f), arguments, f.device)
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from .reference import Configuration
 class Correction(ABC):
     """What makes arrangements stable that move with the reference: options; ``build`` makes the part that acts."""
 
-    #: It can act on those bodies alone whose arrangement moves, beside others that keep theirs.
-    by_body: ClassVar[bool] = False
+    #: It closes sums body by body, and so cannot do with bodies that are bonded to each other.
+    per_body: ClassVar[bool] = False
     #: Its stabiliser has potentials ``psi``, (n,) of vec, that shifting (M15) follows.
     has_potentials: ClassVar[bool] = False
 
     @abstractmethod
-    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "Stabiliser":
-        """Allocate for the bodies of ``flux``, of which those in ``moving`` have arrangements that move."""
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "Stabiliser":
+        """Allocate for the bodies of ``flux``."""
 
 
 class Stabiliser(ABC):
@@ -28,6 +28,8 @@ class Stabiliser(ABC):
 
     #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
     corrects: ClassVar[bool] = True
+    #: Potentials [m], (n,) of vec, of corrections that have them.
+    psi: wp.array
 
     @abstractmethod
     def refresh(self, configuration: Configuration, state: Any) -> None:

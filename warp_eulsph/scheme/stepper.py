@@ -7,6 +7,7 @@ import warp as wp
 
 from .base import Scheme
 from .health import check
+from .updates import make_add
 from .world import Parts, World
 
 
@@ -26,12 +27,18 @@ class Stepper(World, ABC):
         due = self.due(self.steps)  # k = 0, every few steps, or n
         if due:
             self.refresh(due)
-        self.advance()
+        self.move_on()
         self.steps += 1
+
+    def move_on(self) -> None:
+        """Advance U on the present references, and what interactions have of their own; launches only."""
+        self.advance()
+        for interaction in self.interactions:
+            interaction.advance(self)
 
     @abstractmethod
     def advance(self) -> None:
-        """Advance U on the present references; launches only."""
+        """Advance U on the present references, and tick; launches only."""
 
     def _velocity_gradient(self, state: Any) -> None:
         for medium in self.media:
@@ -42,9 +49,16 @@ class Stepper(World, ABC):
             medium.gradients(state)
 
     def _choose_dt(self, state: Any) -> None:
-        self.clock.fields.rate.zero_()
+        self.clock.ask()
         for medium in self.media:
             medium.wave_speeds(state)
+        for condition in self.limiting:
+            condition.limit(state, self.clock.fields)
+            self.clock.add()
+        for interaction in self.interactions:
+            if interaction.limits:
+                interaction.rate(self)
+                self.clock.add()
         self.clock.choose()
 
     def _sense(self, state: Any) -> None:
@@ -62,6 +76,14 @@ class Stepper(World, ABC):
             self.forces.external.zero_()
         for condition in self.conditions:
             condition.load(state, self.clock.fields, fraction, self.forces.external)
+        if self.damped:
+            self.forces.damping.zero_()
+            for condition in self.conditions:
+                condition.damp(state, self.clock.fields, self.forces)
+        for interaction, exchanged in zip(self.interactions, self.exchanged, strict=True):
+            exchanged.zero_()
+            interaction.forces(self, state, fraction, exchanged)
+            self._launch(make_add(self.space), self.n, [exchanged, self.forces.external])
 
     def _smooth(self, state: Any, out: Any) -> None:
         for medium in self.media:

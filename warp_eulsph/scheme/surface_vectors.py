@@ -6,6 +6,7 @@ from typing import Any
 
 import warp as wp
 
+from ..execution import Launcher
 from ..space import Space
 from .dissipation import UpwindForces
 from .flux import Flux
@@ -24,8 +25,9 @@ class SurfaceVectors(Correction):
     """
 
     project: bool = False
+    per_body = True
 
-    def build(self, space: Space, particles: Any, flux: Flux, moving: list[range], device: Any) -> "SurfaceForces":
+    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "SurfaceForces":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return SurfaceForces(self, space, particles, flux.bodies, device)
 
@@ -36,8 +38,8 @@ def _make_correction(space: Space) -> Any:
     vec, mat = space.vec, space.mat
 
     @wp.kernel(module="unique", enable_backward=False)
-    def correction(Q: wp.array(dtype=mat), defect: wp.array(dtype=vec), out: wp.array(dtype=vec)):
-        a = wp.tid()
+    def correction(first: int, Q: wp.array(dtype=mat), defect: wp.array(dtype=vec), out: wp.array(dtype=vec)):
+        a = first + wp.tid()
         out[a] = Q[a] @ defect[a]
 
     return correction
@@ -48,7 +50,7 @@ class SurfaceForces(Stabiliser):
 
     def __init__(self, option: SurfaceVectors, space: Space, particles: Any, bodies: list[range], device: Any):
         self.space, self.device = space, device
-        self.upwind = UpwindForces(space, device)
+        self.upwind, self._launch = UpwindForces(space, device), Launcher(device)
         self.defect = wp.zeros(len(particles.mass), dtype=space.vec, device=device)
         self.projection = Projection(space, particles, bodies, device) if option.project else None
 
@@ -78,6 +80,6 @@ class SurfaceForces(Stabiliser):
         """Internal force (M5), dissipation (M9) and correction (M10) into ``forces``."""
         self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
         arguments = [flux.Q, self.defect, forces.correction]
-        wp.launch(_make_correction(self.space), len(v), arguments, device=self.device)
+        self._launch(_make_correction(self.space), len(v), arguments)
         if self.projection is not None:
             self.projection(configuration.fields.x, forces.correction)

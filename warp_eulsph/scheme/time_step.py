@@ -18,7 +18,8 @@ class TimeStep:
     """Δt = CFL · min spacing/c, wave speeds c of the current state and spacings h_k/dilation measured in the reference.
 
     Particles with a poor neighbourhood (an L_a beyond those of jittered corners) ask for a smaller step, and so do
-    those that strain fast: |∇v| Δt is at most CFL/4.
+    those that strain fast: ∇v Δt is at most CFL/4. So do conditions (``Bound.limit``): with frequencies ω beside
+    those of the waves, 2c/spacing at most, it is Δt = CFL/√(max (c/spacing)² + Σ (ω/2)²).
 
     Args:
         cfl: Courant number; by default that of the scheme, 0.8 for Verlet and 0.4 for the others.
@@ -47,7 +48,10 @@ def _make_choose(space: Space) -> Any:
     def choose(clock: Clock, cfl: wp.float64, growth: wp.float64, fixed: wp.float64):
         dt = fixed
         if fixed == wp.float64(0.0):
-            dt = cfl / wp.float64(clock.rate[0])
+            rate = wp.float64(clock.rate[0])
+            if clock.added[0] > wp.float64(0.0):
+                rate = wp.sqrt(rate * rate + clock.added[0])
+            dt = cfl / rate
             if clock.free_dt[0] > wp.float64(0.0):
                 dt = wp.min(dt, growth * clock.free_dt[0])
         if clock.bad[0] != WELL:
@@ -60,6 +64,7 @@ def _make_choose(space: Space) -> Any:
         elif dt > wp.float64(0.5) * left and fixed == wp.float64(0.0):
             dt = wp.float64(0.5) * left  # two even steps instead of a long and a tiny one
         clock.dt[0] = dt
+        clock.added[0] = wp.float64(0.0)  # asked for anew before the next step
 
     return choose
 
@@ -80,6 +85,19 @@ def _make_tick(space: Space) -> Any:
             clock.running[0] = 0
 
     return tick
+
+
+@functools.cache
+def _make_add(space: Space) -> Any:
+    Clock, real = clock_structure(space), space.real
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def add(clock: Clock):
+        half = wp.float64(0.5) * wp.float64(clock.frequency[0])
+        clock.added[0] = clock.added[0] + half * half
+        clock.frequency[0] = real(0.0)
+
+    return add
 
 
 @functools.cache
@@ -105,9 +123,9 @@ class DeviceClock:
         self._launch = Launcher(device)
         self.cfl = cfl if option.cfl is None else option.cfl
         self.fields = clock_structure(space)()
-        for name in ("t", "dt", "free_dt", "longest_dt", "target"):
+        for name in ("t", "dt", "free_dt", "longest_dt", "target", "added"):
             setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
-        self.fields.rate = wp.zeros(1, dtype=space.real, device=device)
+        self.fields.rate, self.fields.frequency = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))
         self.fields.bad = wp.full(1, WELL, dtype=wp.int32, device=device)
         self.fields.running, self.fields.taken = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
 
@@ -148,8 +166,16 @@ class DeviceClock:
         """Steps taken since the batch was begun; reads the device."""
         return int(self.fields.taken.numpy()[0])
 
+    def ask(self) -> None:
+        """Begin to ask for the next step: of the waves by ``rate``, of others by ``frequency`` and ``add``."""
+        self.fields.rate.zero_()
+
+    def add(self) -> None:
+        """Count the ``frequency`` that one condition asked for."""
+        self._launch.once(_make_add(self.space), 1, [self.fields])
+
     def choose(self) -> None:
-        """Δt for the step to come, from ``rate``."""
+        """Δt for the step to come, from what was asked for."""
         option = self.option
         arguments = [self.fields, self.cfl, option.growth, option.fixed or 0.0]
         self._launch.once(_make_choose(self.space), 1, arguments)

@@ -57,6 +57,19 @@ def make_predict(space: Space, fixed: bool, surfaces: bool) -> Any:
 
 
 @functools.cache
+def make_add(space: Space) -> Any:
+    """Kernel: the forces of an interaction added to those from outside."""
+    vec = space.vec
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def add(first: int, forces: wp.array(dtype=vec), external: wp.array(dtype=vec)):
+        a = first + wp.tid()
+        external[a] = external[a] + forces[a]
+
+    return add
+
+
+@functools.cache
 def make_kick(space: Space) -> Any:
     """Kernel: v^{n+1} (M8)."""
     real, vec = space.real, space.vec

@@ -15,6 +15,7 @@ from .shifting import Shifting
 from .stabiliser import Correction
 from .stepper import Stepper
 from .tie import Tie
+from .tilt import Tilt
 from .world import Parts
 
 
@@ -33,6 +34,8 @@ class Verlet(Scheme):
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
         shifting: what keeps moving arrangements even (M15), with Balance() only; None shifts nothing.
         tie: what ties positions to F where the arrangement does not move (M16); None leaves hourglass modes free.
+        tilt: what pair weights are multiplied by near free faces, where the arrangement does not move (M17); None
+            leaves coarse bodies soft.
     """
 
     dissipation: Upwind | None = Upwind()
@@ -40,6 +43,7 @@ class Verlet(Scheme):
     limiter: FluxCorrectedTransport | None = None
     shifting: Shifting | None = None
     tie: Tie | None = Tie()
+    tilt: Tilt | None = Tilt()
     #: Tested Courant number; the limit is 1.1 to 1.3 in bounded 3-D bodies.
     cfl: ClassVar[float] = 0.8
 

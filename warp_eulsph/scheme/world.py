@@ -1,5 +1,6 @@
 """The world of a simulation: media under conditions, with one state, one clock and one ledger."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,15 +10,16 @@ import warp as wp
 from ..boundaries import Bound
 from ..execution import Launcher
 from ..fields import allocate, arrays, repeated
+from ..interactions import BoundInteraction
 from ..operators.neighbours import NeighbourLists
 from ..space import Space
+from .exchanges import Exchange, Exchanges
 from .flux import Flux
 from .ledger import Ledger
 from .medium import Medium, MediumParts
 from .reference import Configuration
 from .refresh import BY_HOST, Refresh
 from .stabiliser import Stabiliser
-from .tie import TiedPairs
 from .time_step import DeviceClock
 
 
@@ -31,6 +33,7 @@ class Parts:
         particles: struct ``Particles``.
         media: in the order of the particles.
         conditions: imposed in this order.
+        interactions: between the media, or with what moves beside them.
         clock: time on the device.
     """
 
@@ -39,6 +42,7 @@ class Parts:
     particles: Any
     media: Sequence[MediumParts]
     conditions: Sequence[Bound]
+    interactions: Sequence[BoundInteraction]
     clock: DeviceClock
 
 
@@ -48,11 +52,13 @@ class World:
     Attributes:
         U: state at tⁿ (struct ``State``). half: state at t^{n+½}.
         media: in the order of the particles. conditions: imposed in this order.
+        interactions: between the media; ``exchanged``: the forces [N] of each, (n,) of vec.
         forces, grad_v: of the last step. clock: time on the device. ledger: where the energy went. steps: taken so far.
     """
 
     def __init__(self, parts: Parts):
         self.space, self.clock, self.conditions = parts.space, parts.clock, parts.conditions
+        self.interactions = parts.interactions
         self.particles, self.U, space = parts.particles, parts.U, parts.space
         self.device, self.n, self.steps = self.clock.device, len(self.U.x), 0
         n, device, self._launch = self.n, self.device, Launcher(self.device)
@@ -61,25 +67,29 @@ class World:
         self.moves_surfaces = not all(medium.policy.fixed for medium in self.media) or any(
             condition.reads_surface for condition in self.conditions
         )
+        self.limiting = [condition for condition in self.conditions if condition.limits]
+        self.exchanged = [wp.zeros(n, dtype=space.vec, device=device) for _ in self.interactions]
         self.half = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
         if not self.moves_surfaces:
             self.half.surface = self.U.surface
         self.forces = self._allocate_forces()
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         for medium in self.media:
-            medium.join([self.U, self.half], self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
+            medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
         self._start([each.surface_given for each in parts.media])
-        self.ledger = Ledger(space, self.particles, self.media, self.clock, device)
+        self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
 
     def _allocate_forces(self) -> Any:
         """Struct ``Forces``, where those that are always zero take the memory of one."""
         n, vec, device = self.n, self.space.vec, self.device
-        self.loaded = any(condition.loads for condition in self.conditions)
+        self.damped = any(condition.damps for condition in self.conditions)
+        self.loaded = self.damped or bool(self.interactions) or any(condition.loads for condition in self.conditions)
         there = {
             "correction": any(medium.stabiliser.corrects for medium in self.media),
-            "tie": any(medium.tie is not None for medium in self.media),
+            "tie": any(medium.pairs is not None for medium in self.media),
             "external": self.loaded,
+            "damping": self.damped,
         }
         forces = allocate(self.space, "Forces", n, device, empty=there)
         self._zero = wp.zeros(1, dtype=vec, device=device)
@@ -99,12 +109,21 @@ class World:
         for medium in self.media:
             medium.stabilise(self.U)
 
+    def _exchanges(self) -> Exchanges | None:
+        """The page of the interactions, where there are any."""
+        if not self.interactions:
+            return None
+        between = zip(self.interactions, self.exchanged, strict=True)
+        listed = [Exchange(forces, functools.partial(interaction.energy, self)) for interaction, forces in between]
+        return Exchanges(self.space, self.particles, self.clock.fields, listed, self.device)
+
     # the references
 
     def due(self, step: int) -> tuple[int, ...]:
         """Which media's references are to be refreshed before step number ``step``; the first finds them fresh."""
-        media = enumerate(self.media) if step > 0 else ()
-        return tuple(k for k, m in media if m.policy.due(step, m.configuration, m.of(self.U).F))
+        if step == 0:
+            return ()
+        return tuple([k for k, medium in enumerate(self.media) if medium.due(step, self.U)])
 
     def refresh(self, due: Sequence[int], by: Refresh = BY_HOST) -> None:
         """Make U the reference of these media, shifted (M15)."""
@@ -150,9 +169,12 @@ class World:
             name = "" if len(self.media) == 1 else f"Medium.{k}."
             listed.append({name + own: array for own, array in medium.evolving().items()})
         listed += [self.clock.evolving(), self.ledger.evolving()]
-        for i, condition in enumerate(self.conditions):
-            listed.append({f"Condition.{i}.{name}": array for name, array in condition.evolving().items()})
-        return {name: array for part in listed for name, array in part.items()}
+        parts: list[tuple[str, Bound | BoundInteraction]] = []
+        parts += [(f"Condition.{i}", condition) for i, condition in enumerate(self.conditions)]
+        parts += [(f"Interaction.{i}", interaction) for i, interaction in enumerate(self.interactions)]
+        for own, part in parts:
+            listed.append({f"{own}.{name}": array for name, array in part.evolving().items()})
+        return {name: array for held in listed for name, array in held.items()}
 
     # of the only medium, where there is one
 
@@ -181,11 +203,6 @@ class World:
     def stabiliser(self) -> Stabiliser:
         """What keeps the sums of the only medium stable."""
         return self.medium.stabiliser
-
-    @property
-    def tie(self) -> TiedPairs | None:
-        """What ties positions to F in the only medium."""
-        return self.medium.tie
 
     # lines of a step
 

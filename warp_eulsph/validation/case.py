@@ -5,7 +5,7 @@ import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ..output import Figure
+from .report import Figure
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..output import Figure, table
 from . import case as registry
 from .case import Case
+from .report import Figure, table
 
 _log = logging.getLogger(__name__)
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..output import Figure
 from .history import History
+from .report import Figure
 
 
 def energy_figures(

@@ -171,7 +171,7 @@ class Step:
             for field in (particles.h, particles.spacing):
                 field.assign(field.numpy() / volume ** (1.0 / point.dim))
             configuration.refresh(stepper.U)
-        simulation.clock.fields.rate.zero_()
+        simulation.clock.ask()
         flux.wave_speeds(stepper.U.F, stepper.grad_v, configuration, simulation.clock.fields)
         self.speed = float(flux.fields.speed.numpy().max())
         self.dt = point.cfl / float(simulation.clock.fields.rate.numpy()[0])

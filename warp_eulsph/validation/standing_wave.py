@@ -15,13 +15,13 @@ import numpy as np
 from ..boundaries import Antisymmetry, Wall, mirror
 from ..geometry import box
 from ..materials import LinearElastic
-from ..output import Figure
 from ..output.stress import cauchy_stress
 from ..scheme.arrangement import Current
 from ..scheme.policy import Always, ReferencePolicy
 from ..simulation import Body, Simulation
 from ..weights import CubicSpline
 from .figures import difference, order
+from .report import Figure
 
 DENSITY, YOUNG, POISSON = 1100.0, 17e6, 0.3
 MU, KAPPA = YOUNG / 2 / (1 + POISSON), YOUNG / 3 / (1 - 2 * POISSON)
@@ -70,7 +70,7 @@ def build(dim: int, n: int, reference: ReferencePolicy, **options: Any) -> tuple
     wave = StandingWave(x)
     material = LinearElastic(density=DENSITY, young=YOUNG, poisson=POISSON)
     body = Body(x=x, volume=volume, material=material, velocity=wave.velocity(0.0))
-    depth = 2 * CubicSpline().support * DILATION / n  # ghosts next to the plane need all of their own neighbours
+    depth = 3 * CubicSpline().support * DILATION / n  # ghosts next to the plane need all neighbours, and these theirs
     conditions = []
     for i in range(dim):
         for position, image in ((0.0, Wall()), (1.0, Antisymmetry())):

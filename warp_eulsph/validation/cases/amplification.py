@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...output import Figure
 from ...scheme.scalar import ConservationLaw, LinearAdvection
 from ...scheme.smoothing import NeighbourAverage
 from ...weights import CubicSpline, Weight, WendlandC2
 from ..case import Case
+from ..report import Figure
 
 #: Exact stability limits of Lax-Wendroff-CSPH: (weight, h/dx) -> line, square, cubic lattice, as text so that every
 #: printed digit counts. At h = 0.7 dx the nearest particles alone lie in the support of the cubic spline.

@@ -7,7 +7,6 @@ import numpy as np
 
 from ...boundaries import Fixed
 from ...materials import Bar
-from ...output import Figure
 from ...scheme.arrangement import Current
 from ...scheme.lax_wendroff import LaxWendroff
 from ...scheme.limiter import FluxCorrectedTransport
@@ -17,6 +16,7 @@ from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import difference, energy_figures, order, rms
 from ..history import History, record
+from ..report import Figure
 
 YOUNG, DENSITY, LENGTH, SPEED = 200e9, 7833.0, 0.1333, 5.0
 WAVE_SPEED = np.sqrt(YOUNG / DENSITY)
@@ -77,7 +77,7 @@ def measure(simulation: Simulation, writer: Any = None) -> History:
         u_exact, v_exact = exact(X, simulation.t)
         return {"u": u, "v": v, "u_exact": u_exact, "v_exact": v_exact, "energy": simulation.energy()["total"]}
 
-    return record(simulation, np.linspace(0.0, END_TIME, FRAMES + 1), observe, writer=writer)
+    return record(simulation, np.linspace(0.0, END_TIME, FRAMES + 1), observe, writer=writer, stride=20)
 
 
 def errors(history: History) -> dict[str, float]:

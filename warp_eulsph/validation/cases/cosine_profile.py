@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...output import Figure
 from ...scheme.scalar import ConservationLaw, LinearAdvection, OneStepLax, ScalarScheme, TwoStepLaxWendroff
 from ..case import Case
 from ..figures import order, rms
+from ..report import Figure
 
 LAX, LAX_WENDROFF = OneStepLax(), TwoStepLaxWendroff()
 #: (scheme, h/dx, CFL) -> largest value, place, least value, L2 error, as text so that every printed digit counts: the

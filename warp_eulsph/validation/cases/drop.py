@@ -17,8 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ... import Always, Body, Simulation, TaitLiquid
-from ...output import Figure
 from ..case import Case
+from ..report import Figure
 
 RATE = 100.0  # 1/s
 # time [s] -> semi-axes A, B [m]

@@ -15,10 +15,10 @@ import numpy as np
 from ...boundaries import Fixed, Velocity
 from ...geometry import box
 from ...materials import NeoHookean
-from ...output import Figure
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
+from ..report import Figure
 
 YOUNG, POISSON = 1e6, 0.3
 MU, KAPPA = YOUNG / (2.0 * (1.0 + POISSON)), YOUNG / (3.0 * (1.0 - 2.0 * POISSON))

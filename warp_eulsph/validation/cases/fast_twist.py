@@ -13,10 +13,10 @@ import numpy as np
 
 from ...boundaries import Fixed
 from ...geometry import box
-from ...output import Figure
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
+from ..report import Figure
 from ..solids import RUBBER
 
 HEIGHT, END_TIME, FRAME = 6.0, 0.1, 0.0025

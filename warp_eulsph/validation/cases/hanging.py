@@ -13,10 +13,10 @@ import numpy as np
 from ...boundaries import BodyForce, Fixed
 from ...geometry import box
 from ...materials import NeoHookean
-from ...output import Figure
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
+from ..report import Figure
 
 GRAVITY = 800.0  # m/s²
 CUBE = NeoHookean(density=1000.0, young=1e6, poisson=0.3)

@@ -23,8 +23,8 @@ import warp as wp
 
 from ... import Always, Body, Current, NeoHookean, ReferencePolicy, Simulation, TimeStep, Velocity, Verlet
 from ...geometry import box
-from ...output import Figure
 from ..case import Case
+from ..report import Figure
 
 # period [s] -> stretch, median relative error of F, rms(J − 1) and half a unit of its last digit; at T/2 of 64²
 AIMED = {1.0: (2.5, 0.004, 5.5e-3, 5e-5), 2.0: (4.9, 0.009, 1.9e-2, 5e-4), 4.0: (10.0, 0.027, 4.2e-2, 5e-4)}

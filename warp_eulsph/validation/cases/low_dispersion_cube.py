@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from ...output import Figure
 from ..case import Case
+from ..report import Figure
 from ..standing_wave import figures
 
 LEVELS, QUICK = (10, 13, 16, 20), (6, 8, 10)

@@ -14,13 +14,13 @@ import numpy as np
 from ...boundaries import Velocity
 from ...geometry import box
 from ...materials import NeoHookean
-from ...output import Figure
 from ...scheme.arrangement import Current
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import difference
 from ..history import History, record
+from ..report import Figure
 
 DENSITY, YOUNG, POISSON = 1100.0, 17e6, 0.3
 MU, KAPPA = YOUNG / 2 / (1 + POISSON), YOUNG / 3 / (1 - 2 * POISSON)

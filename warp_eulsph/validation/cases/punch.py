@@ -13,13 +13,13 @@ import warp as wp
 
 from ...boundaries import Fixed, Velocity
 from ...geometry import box
-from ...output import Figure
 from ...scheme.arrangement import Current
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import rms
 from ..history import History, at, record, series
+from ..report import Figure
 from ..solids import RUBBER, MaterialPoint
 
 END_TIME, FRAME = 0.03, 1e-4  # s

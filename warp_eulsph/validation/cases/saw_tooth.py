@@ -21,10 +21,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...output import Figure
 from ...scheme.policy import Always, Never
 from ...scheme.verlet import Verlet
 from ..case import Case
+from ..report import Figure
 from ..stability import CLOSED
 from ..stability_step import RESOLVED, Point, Step, spectral_radius, symbols
 

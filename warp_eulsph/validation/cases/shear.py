@@ -28,8 +28,8 @@ from ... import (
     Verlet,
 )
 from ...geometry import box
-from ...output import Figure
 from ..case import Case
+from ..report import Figure
 
 RATE = 10.0  # 1/s
 LAYERS = 3

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from ...geometry import box
-from ...output import Figure
 from ...scheme.arrangement import Current
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import difference, energy_figures
 from ..history import History, at, record, series
+from ..report import Figure
 from ..solids import RUBBER, MaterialPoint
 
 SPIN = 105.0  # rad/s

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from ...output import Figure
 from ..case import Case
+from ..report import Figure
 from ..standing_wave import figures
 
 LEVELS, QUICK = (12, 16, 20, 28), (12, 16, 20)

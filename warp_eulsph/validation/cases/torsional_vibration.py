@@ -16,11 +16,11 @@ import numpy as np
 from ...boundaries import Fixed
 from ...geometry import box
 from ...materials import LinearElastic
-from ...output import Figure
 from ...scheme.policy import Never
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import order
+from ..report import Figure
 from ..solids import RUBBER
 
 HEIGHT = 6.0  # m

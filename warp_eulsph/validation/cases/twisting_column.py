@@ -7,13 +7,13 @@ import numpy as np
 
 from ...boundaries import Fixed
 from ...geometry import box
-from ...output import Figure
 from ...scheme.arrangement import Current
 from ...scheme.policy import Always, ReferencePolicy
 from ...simulation import Body, Simulation
 from ..case import Case
 from ..figures import energy_figures, order
 from ..history import History, record, series
+from ..report import Figure
 from ..solids import RUBBER, MaterialPoint
 
 HEIGHT, END_TIME, FRAMES = 6.0, 0.11, 110
@@ -54,13 +54,18 @@ def reference_history() -> History:
     return {"t": columns["t"], "rotation": turned(0.5 + columns["ucx"], 0.5 + columns["ucz"]), "stored": columns["W"]}
 
 
-def run(quick: bool) -> Sequence[Figure]:
-    """Largest rotation within 5 % at 12 across, approached at order 1.3 at least: within 14 % at 6 across.
+#: Of energy, accepted: of the first steps, whose velocities jump at the clamp, by the time integration. Without any
+#: dissipation or tilt it is the same, 2e-4, 5e-5 after one step at 4, 6 across; the step's square is a third.
+GAIN = 5e-5
 
-    When quick, 4, 5 and 6 across are not asymptotic: the tie (M16) takes most where a column is coarsest, and no order
+
+def run(quick: bool) -> Sequence[Figure]:
+    """Largest rotation within 5 % at 6 across and 2 % at 12, approached at order 1.3 at least.
+
+    When quick, 4, 5 and 6 across are not asymptotic: the tilt (M17) takes most where a column is coarsest, and no order
     is asked for.
     """
-    levels, band, least_order = ((4, 5, 6), 0.14, -np.inf) if quick else ((6, 8, 12), 0.05, 1.3)
+    levels, band, least_order = ((4, 5, 6), 0.05, -np.inf) if quick else ((6, 8, 12), 0.02, 1.3)
     reference = reference_history()
     exact = reference["rotation"].max()
     figures, rotation_errors, history, residual = [], [], {}, 0.0
@@ -80,7 +85,7 @@ def run(quick: bool) -> Sequence[Figure]:
         Figure("time_error", time / reference["t"][reference["rotation"].argmax()] - 1.0, reference=0.0),
         Figure("stored_error", history["stored"].max() / reference["stored"].max() - 1.0, reference=0.0),
         Figure("current_arrangement_difference", apart, reference=0.0),
-        *energy_figures(history, residual),
+        *energy_figures(history, residual, gain=GAIN),
     ]
 
 

@@ -25,9 +25,9 @@ import warp as wp
 
 from ... import Always, Body, BodyForce, NeoHookeanLog, Never, ReferencePolicy, Simulation, UnstableError
 from ...geometry import annulus
-from ...output import Figure
 from ..case import Case
 from ..figures import order
+from ..report import Figure
 
 INNER, OUTER = 0.75, 1.25  # m
 RING = NeoHookeanLog(density=1e3, young=1e6, poisson=0.3)

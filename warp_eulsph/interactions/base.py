@@ -1,0 +1,73 @@
+"""What an interaction declares: forces between bodies, or between bodies and something that moves beside them."""
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ..boundaries import Assembly
+
+if TYPE_CHECKING:
+    from ..scheme.world import World
+
+
+class Interaction(ABC):
+    """An interaction as the user states it; ``bind`` makes the part that acts.
+
+    A new interaction is one file: this declaration, a frozen dataclass, and its ``BoundInteraction``.
+    """
+
+    @abstractmethod
+    def bind(self, assembly: Assembly) -> "BoundInteraction":
+        """Select particles and allocate."""
+
+
+class BoundInteraction(ABC):
+    """An interaction at work; override what it does.
+
+    What it does to kinetic and stored energy and to its own is in its account of the ledger: nothing where its forces
+    are those of its energy, but for the error of the steps; less than nothing where it dissipates.
+
+    Attributes:
+        indices: numbers of the particles it acts on, (k,) int32.
+        recordable: whether all that it does in a step is to launch kernels, so that a graph can repeat it.
+        sortable: whether particles may be sorted in memory, as in ``Bound``.
+    """
+
+    indices: np.ndarray
+    recordable: bool = False
+    sortable: bool = False
+
+    @abstractmethod
+    def forces(self, world: "World", state: Any, fraction: float, out: wp.array) -> None:
+        """Add forces [N] at ``state``, at time t + fraction · Δt, to ``out``, (n,) of vec by place.
+
+        Called once or twice a step; the last call is that of the full step. Pair forces keep momentum to round-off if
+        each particle sums its own and both ends find the same number.
+        """
+
+    def rate(self, world: "World") -> None:  # noqa: B027  (soft forces ask for nothing)
+        """Ask for a shorter step, before it is chosen, as ``Bound.limit`` does by ``world.clock.fields.frequency``.
+
+        A pair of stiffness k has √(k/m_a + k/m_b) [1/s].
+        """
+
+    @property
+    def limits(self) -> bool:
+        """Whether ``rate`` asks for a shorter step."""
+        return type(self).rate is not BoundInteraction.rate
+
+    def advance(self, world: "World") -> None:  # noqa: B027  (most have nothing of their own)
+        """Move what it has of its own by the step, once the bodies are where they end, at time t + Δt.
+
+        A rigid body moves by the force that it noted in the last ``forces``, friction keeps what slipped.
+        """
+
+    def energy(self, world: "World") -> float:
+        """Energy [J] that it holds at ``world.U``, kinetic energy of its own included; reads the device."""
+        return 0.0
+
+    def evolving(self) -> dict[str, wp.array]:
+        """Arrays by name that a step reads before it writes them: what a checkpoint must hold of it."""
+        return {}

@@ -1,0 +1,122 @@
+"""What output asks of a run: protocols that ``Simulation`` and ``Transport`` fulfil, so that it knows neither."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol, TypeGuard
+
+import numpy as np
+import warp as wp
+
+from ..boundaries import Boundary
+from ..order import Order
+from ..scheme.reference import Configuration
+from ..space import Space
+from ..whole import Whole
+
+
+class Recorded(Protocol):
+    """A run that can be recorded, resumed and shown.
+
+    Attributes:
+        ranges: places of the particles of each body.
+        whole: guards its steps.
+        output: who keeps frames, set while it does.
+    """
+
+    space: Space
+    device: Any
+    particles: Any
+    ranges: dict[str, range]
+    order: Order
+    whole: Whole
+    output: Any
+
+    @property
+    def configuration(self) -> Configuration:
+        """The configuration in which weights live now."""
+
+    @property
+    def X(self) -> np.ndarray:
+        """Initial positions [m], (n, dim)."""
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+
+    @property
+    def dt(self) -> float:
+        """Last time step [s]."""
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+
+    @property
+    def counters(self) -> dict[str, float]:
+        """The numbers beside the arrays that evolve."""
+
+    def evolving(self) -> dict[str, wp.array]:
+        """Every array that a step reads before it writes it, by name."""
+
+    def restore(self, arrays: Mapping[str, np.ndarray], counters: Mapping[str, float]) -> None:
+        """Take over what ``evolving`` and ``counters`` were."""
+
+    def advance(self, until: float, most: int | None = None) -> None:
+        """Take a few steps towards ``until`` [s]."""
+
+
+class RecordedSolids(Recorded, Protocol):
+    """Bodies that deform under conditions."""
+
+    stepper: Any
+    clock: Any
+    diagnostics: Any
+    sorting: Any
+    bodies: Any
+    boundaries: tuple[Boundary, ...]
+    conditions: Any
+    interactions: Any
+    bound_interactions: Any
+    options: Any
+    reference: Any
+    arrangement: Any
+    dilation: float
+
+    def energy(self) -> dict[str, float]:
+        """Energies [J], by account."""
+
+    def momentum(self) -> np.ndarray:
+        """[kg m/s], (dim,)."""
+
+    def angular_momentum(self) -> np.ndarray:
+        """About the origin [kg m²/s]."""
+
+    def extrema(self) -> dict[str, float]:
+        """Least and largest of what tells how a run goes."""
+
+    def reaction(self, boundary: Boundary) -> np.ndarray:
+        """Force [N] of a condition on its particles, (dim,)."""
+
+
+class RecordedTransport(Recorded, Protocol):
+    """A quantity carried along on particles that stay where they are; ``exact`` is None where it is not known."""
+
+    law: Any
+    time_step: float
+    exact: Any
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions [m], (n, dim)."""
+
+    def amounts(self) -> dict[str, float]:
+        """Amount, least and largest value."""
+
+
+def solids(run: Recorded) -> TypeGuard[RecordedSolids]:
+    """Whether a run is one of bodies that deform."""
+    return hasattr(run, "stepper")
+
+
+def transport(run: Recorded) -> TypeGuard[RecordedTransport]:
+    """Whether a run is one of a quantity that is carried along."""
+    return hasattr(run, "law")

@@ -1,0 +1,138 @@
+"""The internal force (M5) alone, where the arrangement is as it was at the start and needs no correction."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..execution import Launcher
+from ..fields import neighbour_structure, structure
+from ..simd import BY_TWO_DUAL, packed_rows, prelude
+from ..space import Space
+from .reference import Configuration
+from .stabiliser import Stabiliser
+
+
+@functools.cache
+def _make_pack(space: Space) -> Any:
+    """Kernel: columns of Π = Q Lᵀ (M5), made here, each with a coordinate of x, side by side."""
+    real, dim = space.real, space.dim
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pack(first: int, reference: Reference, flux: Flux, rows: wp.array2d(dtype=real)):
+        a = first + wp.tid()
+        x_a, Pi_a = reference.x[a], flux.Q[a] @ wp.transpose(reference.L[a])
+        for j in range(wp.static(dim)):
+            rows[a, 4 * j + 3] = x_a[j]
+            for i in range(wp.static(dim)):
+                rows[a, 4 * j + i] = Pi_a[i, j]
+
+    return pack
+
+
+@functools.cache
+def _make_forces(space: Space, tilted: bool) -> Any:
+    """Kernel: M5 from packed rows; with tilted weights their Σ own ξ is known (M17), without it is summed here."""
+    real, vec = space.real, space.vec
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+    separation = "spread(P, 3) - x_a[j]"
+    if space.periodic:
+        separation = f"nearest_along({separation}, j)"
+    snippet = f"""
+    {prelude(space)}
+    const Q* const all = (const Q*)rows.data;
+    {
+        ""
+        if not space.periodic
+        else '''
+    auto nearest_along = [&](V d, int j) __attribute__((always_inline)) {
+        return d - image_box[j] * __builtin_elementwise_rint(d * image_rate[j]);
+    };'''
+    }
+    T x_a[dim];
+    V Pi_a[dim], sums[4] = {{0, 0, 0, 0}};
+    #pragma unroll
+    for (int j = 0; j < dim; ++j) {{
+        const Q row = all[(size_t)a * dim + j];
+        x_a[j] = row[3];
+        Pi_a[j] = both(row, row);
+    }}
+    auto two = [&](int b, int c, V w, int part) __attribute__((always_inline)) {{
+        V force = 0;
+        #pragma unroll
+        for (int j = 0; j < dim; ++j) {{
+            const V P = both(all[(size_t)b * dim + j], all[(size_t)c * dim + j]);
+            force += {"P" if tilted else "(P + Pi_a[j])"} * ({separation});
+        }}
+        sums[part] += force * w;
+    }};
+    {BY_TWO_DUAL}
+    V internal = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    Q force = fold(internal);
+    if ({int(tilted)}) for (int j = 0; j < dim; ++j) force += all[(size_t)a * dim + j] * moment.data[a].c[j];
+    internals.data[a] = store(force * V_a);
+    """
+
+    @wp.func_native(snippet)
+    def sum_forces(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        own: wp.array(dtype=real),
+        box: vec,
+        rows: wp.array2d(dtype=real),
+        moment: wp.array(dtype=vec),
+        V_a: real,
+        internals: wp.array(dtype=vec),
+    ): ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def dual_forces(
+        first: int, reference: Reference, near: Neighbours, rows: wp.array2d(dtype=real), internal: wp.array(dtype=vec)
+    ):
+        a = first + wp.tid()
+        begin, end = near.start[a], near.start[a + 1]
+        V_a, moment = reference.V[a], reference.moment
+        sum_forces(a, begin, end, near.index, near.w, near.own, near.box, rows, moment, V_a, internal)
+
+    return dual_forces
+
+
+class DualForces(Stabiliser):
+    """M5 at work; what dissipates and ties there is in the stress already (M9, M16)."""
+
+    corrects = False
+
+    def __init__(self, space: Space, n: int, device: Any):
+        self.space, self._launch = space, Launcher(device)
+        self._rows = packed_rows(space, n, space.dim, device)
+
+    def refresh(self, configuration: Configuration, state: Any) -> None:
+        """Nothing to prepare."""
+
+    def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
+        """The portable kernel does, the SIMD pass makes its own."""
+        return not configuration.simd
+
+    def compute(
+        self,
+        configuration: Configuration,
+        flux: Any,
+        x: wp.array,
+        v: wp.array,
+        grad_v: wp.array,
+        epsilon: float,
+        sensor: wp.array | None,
+        forces: Any,
+    ) -> None:
+        """Internal force (M5) into ``forces``."""
+        if not configuration.simd:
+            configuration.divergence(flux.Pi, forces.internal)
+            return
+        n = len(forces.internal)
+        self._launch(_make_pack(self.space), n, [configuration.fields, flux, self._rows])
+        kernel = _make_forces(self.space, configuration.tilt is not None)
+        self._launch(kernel, n, [configuration.fields, configuration.near, self._rows, forces.internal])

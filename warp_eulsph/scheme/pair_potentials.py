@@ -1,0 +1,310 @@
+"""What acts between pairs that keep their labels: the tie (M16) and dissipation (M9), forces and stresses in a pass."""
+
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import warp as wp
+
+from ..execution import Launcher
+from ..fields import neighbour_structure, structure
+from ..linalg import inverse
+from ..simd import BY_EIGHT, packed_rows, prelude
+from ..space import Space, difference
+from .dissipation import blend, upwind
+from .flux import Flux
+from .reference import Configuration
+from .tie import Tie
+
+
+def _vectors(space: Space) -> int:
+    """Rows of four: X with the impedance, u, v with the shear impedance, columns of −½(F − I) and of −½∇v F⁻¹."""
+    return 3 + 2 * space.dim
+
+
+@functools.cache
+def _make_pack(space: Space) -> Any:
+    """Kernel: what the SIMD pass reads of a neighbour, side by side."""
+    real, vec, mat, dim, invert = space.real, space.vec, space.mat, space.dim, inverse(space)
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
+    first_H, first_grad = 12, 12 + 4 * dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pack(
+        first: int,
+        reference: Reference,
+        flux: Flux,
+        x: wp.array(dtype=vec),
+        F: wp.array(dtype=mat),
+        v: wp.array(dtype=vec),
+        grad_v: wp.array(dtype=mat),
+        rows: wp.array2d(dtype=real),
+    ):
+        a = first + wp.tid()
+        X_a, v_a, grad_a = reference.x[a], v[a], grad_v[a] @ invert(F[a])
+        u_a, H_a = x[a] - X_a, F[a] - wp.identity(n=wp.static(dim), dtype=real)
+        rows[a, 3] = flux.impedance[a]
+        rows[a, 11] = flux.shear_impedance[a]
+        for i in range(wp.static(dim)):
+            rows[a, i] = X_a[i]
+            rows[a, 4 + i] = u_a[i]
+            rows[a, 8 + i] = v_a[i]
+            for j in range(wp.static(dim)):
+                rows[a, first_H + 4 * j + i] = H_a[i, j] * real(-0.5)
+                rows[a, first_grad + 4 * j + i] = grad_a[i, j] * real(-0.5)
+
+    return pack
+
+
+@functools.cache
+def _make_simd(space: Space) -> Any:
+    """Kernel of the pass from packed rows, without a sensor."""
+    real, vec, mat = space.real, space.vec, space.mat
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+    Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
+    snippet = f"""
+    {prelude(space)}
+    constexpr int vectors = {_vectors(space)};
+    const Q* const all = (const Q*)rows.data;
+    const auto own = [&](int m, T sign) {{
+        Q q = all[(size_t)a * vectors + m];
+        q[3] *= sign;
+        return both(q, q);
+    }};
+    // impedances are added where the rest is subtracted
+    const V X_a = own(0, -1), u_a = own(1, 1), v_a = own(2, -1);
+    V H_a[dim], grad_a[dim], tie[dim], drag[dim], tied[dim * dim], dragged[dim * dim];
+    #pragma unroll
+    for (int j = 0; j < dim; ++j) {{
+        H_a[j] = own(3 + j, 1);
+        grad_a[j] = own(3 + dim + j, 1);
+        tie[j] = drag[j] = 0;
+    }}
+    #pragma unroll
+    for (int j = 0; j < dim * dim; ++j) tied[j] = dragged[j] = 0;
+    auto eight = [&](const int* b, V w) __attribute__((always_inline)) {{
+        V xi[4], apart[4], jump[4], now[4], X[4], R[4], J[4], N[4];
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) {{
+            const Q* const B = all + (size_t)b[i] * vectors;
+            const Q* const C = all + (size_t)b[i + 4] * vectors;
+            xi[i] = nearest(both(B[0], C[0]) - X_a);
+            apart[i] = both(B[1], C[1]) - u_a;
+            now[i] = xi[i] + apart[i];
+            jump[i] = both(B[2], C[2]) - v_a;
+            #pragma unroll
+            for (int j = 0; j < dim; ++j) {{
+                apart[i] += (H_a[j] + both(B[3 + j], C[3 + j])) * spread(xi[i], j);
+                jump[i] += (grad_a[j] + both(B[3 + dim + j], C[3 + dim + j])) * spread(now[i], j);
+            }}
+        }}
+        turn(xi, X);
+        turn(now, N);
+        turn(jump, J);
+        turn(apart, R);
+        V rr = X[0] * X[0], nn = N[0] * N[0], along = N[0] * J[0];
+        #pragma unroll
+        for (int j = 1; j < dim; ++j) {{
+            rr += X[j] * X[j];
+            nn += N[j] * N[j];
+            along += N[j] * J[j];
+        }}
+        nn = nn > 0 ? nn : (V)1;
+        const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon), stiffness = w * modulus;
+        const V Z = X[3], Z_shear = J[3], normal = along * (Z - Z_shear) * (area / nn), shear = Z_shear * area;
+        #pragma unroll
+        for (int i = 0; i < dim; ++i) {{
+            const V pull = R[i] * stiffness, push = N[i] * normal + J[i] * shear;
+            tie[i] += pull;
+            drag[i] += push;
+            #pragma unroll
+            for (int j = 0; j < dim; ++j) {{
+                tied[i * dim + j] += pull * X[j];
+                dragged[i * dim + j] += push * N[j];
+            }}
+        }}
+    }};
+    {BY_EIGHT}
+    #pragma unroll
+    for (int i = 0; i < dim; ++i) {{
+        ties.data[a].c[i] = total(tie[i]) * V_a;
+        drags.data[a].c[i] = total(drag[i]) * V_a;
+        #pragma unroll
+        for (int j = 0; j < dim; ++j) {{
+            tie_stress.data[a].data[i][j] = total(tied[i * dim + j]) * T(-0.5);
+            drag_stress.data[a].data[i][j] = total(dragged[i * dim + j]) * T(-0.5);
+        }}
+    }}
+    """
+
+    @wp.func_native(snippet)
+    def sum_pairs(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        box: vec,
+        rows: wp.array2d(dtype=real),
+        modulus: real,
+        epsilon: real,
+        V_a: real,
+        ties: wp.array(dtype=vec),
+        drags: wp.array(dtype=vec),
+        tie_stress: wp.array(dtype=mat),
+        drag_stress: wp.array(dtype=mat),
+    ): ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pair_potentials_simd(
+        first: int,
+        reference: Reference,
+        near: Neighbours,
+        rows: wp.array2d(dtype=real),
+        F: wp.array(dtype=mat),
+        modulus: real,
+        epsilon: real,
+        flux: Flux,
+        forces: Forces,
+    ):
+        a = first + wp.tid()
+        begin, end, V_a = near.start[a], near.start[a + 1], reference.V[a]
+        tie, drag = forces.tie, forces.dissipation
+        sum_pairs(
+            a, begin, end, near.index, near.w, near.box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag
+        )
+        flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
+        flux.Q[a] = flux.Q[a] + flux.tie[a] + flux.drag[a]
+
+    return pair_potentials_simd
+
+
+@functools.cache
+def _make_spatial(space: Space) -> Any:
+    """Kernel: ∇v F⁻¹, the gradient of v in the present configuration."""
+    mat, invert = space.mat, inverse(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def spatial(first: int, F: wp.array(dtype=mat), grad_v: wp.array(dtype=mat), out: wp.array(dtype=mat)):
+        a = first + wp.tid()
+        out[a] = grad_v[a] @ invert(F[a])
+
+    return spatial
+
+
+@functools.cache
+def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
+    """Kernel of the pass; M9 where ``damped``, of D = ∇v F⁻¹, reconstructed only where v is smooth if ``sensed``.
+
+    What is not reconstructed leaves no stress. Π is kept with ``dual``.
+    """
+    real, vec, mat = space.real, space.vec, space.mat
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+    Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
+    separation, pair_force, mix, invert = difference(space), upwind(space), blend(space), inverse(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pair_potentials(
+        first: int,
+        reference: Reference,
+        near: Neighbours,
+        x: wp.array(dtype=vec),
+        F: wp.array(dtype=mat),
+        v: wp.array(dtype=vec),
+        D: wp.array(dtype=mat),
+        sensor: wp.array(dtype=vec),
+        modulus: real,
+        epsilon: real,
+        flux: Flux,
+        forces: Forces,
+    ):
+        a = first + wp.tid()
+        tie, drag = vec(), vec()
+        tied, dragged = mat(), mat()
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            xi = separation(reference.x[b], reference.x[a], near.box)
+            # by displacements: in a periodic box the nearest image of a strained pair may be another
+            now = xi + ((x[b] - reference.x[b]) - (x[a] - reference.x[a]))
+            pull = (now - (F[a] + F[b]) @ (xi * real(0.5))) * (modulus * near.w[k])
+            tie += pull
+            tied += wp.outer(pull, xi)
+            if wp.static(damped):
+                plain = v[b] - v[a]
+                smooth = (plain - (D[a] + D[b]) @ (now * real(0.5))) * epsilon
+                jump = smooth
+                if wp.static(sensed):
+                    jump = mix(smooth, plain, real(1.0), sensor[a], sensor[b])
+                    smooth = mix(smooth, vec(), real(1.0), sensor[a], sensor[b])
+                Z = flux.impedance[a] + flux.impedance[b]
+                Z_shear = flux.shear_impedance[a] + flux.shear_impedance[b]
+                drag += pair_force(xi, now, near.w[k], Z, Z_shear, jump)
+                dragged += wp.outer(pair_force(xi, now, near.w[k], Z, Z_shear, smooth), now)
+        forces.tie[a] = tie * reference.V[a]
+        flux.tie[a] = tied * real(-0.5)
+        flux.Q[a] = flux.Q[a] + flux.tie[a]
+        if wp.static(damped):
+            forces.dissipation[a] = drag * reference.V[a]
+            flux.drag[a] = (dragged * real(-0.5)) @ wp.transpose(invert(F[a]))
+            flux.Q[a] = flux.Q[a] + flux.drag[a]
+        if wp.static(dual):
+            flux.Pi[a] = flux.Q[a] @ wp.transpose(reference.L[a])
+
+    return pair_potentials
+
+
+class PairPotentials:
+    """The pass at work on a medium whose arrangement does not move: a stress beside every force.
+
+    The forces are derivatives of a potential of positions and F (M16), and of one of velocities and ∇v F⁻¹ (M9) with
+    the pairs as they are now. What they do to F goes through the stress, so that energy and both momenta find all of
+    it; neither potential knows of a rotation.
+
+    Args:
+        tie: None ties nothing.
+        damped: whether M9 is among them; where a correction changes M5 (M10 to M12), M9 comes with that.
+        simd: whether the pass runs by SIMD kernels, which know of no sensor.
+        groups: number of each body, equal for those that are bonded: they have the modulus of the softest, so that
+            pairs across the joint find the same at both ends.
+    """
+
+    def __init__(
+        self, tie: Tie | None, damped: bool, simd: bool, space: Space, flux: Flux, groups: Sequence[int], device: Any
+    ):
+        self.space, self.flux, self._launch = space, flux, Launcher(device)
+        self._damped, self._simd = damped, simd and damped
+        n = len(flux.fields.Q)
+        moduli = [tie.modulus(M, mu, space.dim) if tie is not None else 0.0 for M, mu in flux.moduli()]
+        softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
+        self._bodies = list(zip(flux.bodies, softest, strict=True))
+        self._rows = packed_rows(space, n if self._simd else 0, _vectors(space), device)
+        self._D = wp.zeros(n if damped and not self._simd else 0, dtype=space.mat, device=device)
+        flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
+        if damped:
+            flux.fields.drag = wp.zeros(n, dtype=space.mat, device=device)
+
+    def compute(
+        self,
+        configuration: Configuration,
+        state: Any,
+        v: wp.array,
+        grad_v: wp.array,
+        epsilon: float,
+        sensor: wp.array | None,
+        forces: Any,
+    ) -> None:
+        """Forces [N] at x and F of ``state``, ``v`` and ``grad_v``, and their stresses, which are added to Q."""
+        reference, near, flux = configuration.fields, configuration.near, self.flux.fields
+        if self._simd:
+            arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
+            self._launch(_make_pack(self.space), len(v), arguments)
+            for body, modulus in self._bodies:
+                arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
+                self._launch(_make_simd(self.space), len(body), arguments, body.start)
+            return
+        if self._damped:
+            self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
+        kernel = _make_portable(self.space, self._damped, sensor is not None, len(flux.Pi) > 0)
+        for body, modulus in self._bodies:
+            arguments = [reference, near, state.x, state.F, v, self._D, v if sensor is None else sensor]
+            self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)
