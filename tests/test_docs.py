@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 METHOD = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FOLDERS = ("warp_eulsph", "examples", "tests", "docs")
 SOURCES = sorted(path for folder in FOLDERS[:3] for path in (ROOT / folder).rglob("*.py"))
 EQUATIONS = set(re.findall(r"\((M\d+)\)", METHOD))

@@ -31,7 +31,7 @@ class Turn(ContextDecorator):
         self._waiting: set[int] = set()
 
     def __enter__(self) -> None:
-        if not self._lock.acquire(blocking=False):
+        if not self._lock.acquire(False):
             me = threading.get_ident()
             self._waiting.add(me)
             try:
