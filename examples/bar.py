@@ -6,7 +6,7 @@ A steel bar, left end fixed, right end free, whose right quarter starts at 5 m/s
 end displacement against the exact trapezoid, its overshoot, and the energy kept; draws end displacement and velocity
 (``bar.png``) and writes snapshots of the Eulerian run (open ``run.vtkhdf.series`` in ParaView). Expect the two forms
 to agree, an error that halves with ``-n 80``, and the overshoot nearly gone with the limiter. Seconds on a CPU, after
-a minute in which the kernels are compiled once.
+some ten seconds in which the kernels are compiled once.
 """
 
 import argparse

@@ -320,8 +320,8 @@ def test_bar_is_nodally_exact_at_courant_number_two():
     x = (np.arange(40) + 0.5)[:, None] * dx
     velocity = np.where(x > 0.75 * LENGTH, SPEED, 0.0)
     body = es.Body(x=x, volume=dx, material=Bar(density=DENSITY, young=YOUNG), velocity=velocity)
-    body, fixed_end = mirror(body, point=[0.0], normal=[-1.0], depth=6 * dx)
-    body, free_end = mirror(body, point=[LENGTH], normal=[1.0], depth=6 * dx, image=Antisymmetry())
+    body, fixed_end = mirror(body, point=[0.0], normal=[-1.0], depth=4 * dx)
+    body, free_end = mirror(body, point=[LENGTH], normal=[1.0], depth=4 * dx, image=Antisymmetry())
     assert len(body.x) == 48
     simulation = es.Simulation(
         body,

@@ -6,13 +6,14 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from bodies import lattice
 from kept_runs import plate, short_run
 
 from warp_eulsph.cli import main
 from warp_eulsph.commands.frames import chosen
 from warp_eulsph.output import Run
-from warp_eulsph.pictures import Picture, film, picture, quantity
-from warp_eulsph.pictures.cells import corners, rim, spacing
+from warp_eulsph.pictures import Picture, draw_frame, film, fitted, picture, quantity
+from warp_eulsph.pictures.cells import corners, rim, sheet, spacing
 from warp_eulsph.pictures.draw import suited
 
 
@@ -282,3 +283,40 @@ def test_title_and_first_outline(run, tmp_path):
     assert len(rims) == 4 * side - 4  # the outermost layer of a square lattice
     outlined = image(picture(run[-1], tmp_path / "c.png", Picture(size=(400, 300), outline=rims)))
     assert (outlined != first).any()
+
+
+class Twisted:
+    """A frame of two squares of 12 × 12, each turned by ``most`` r² about its middle."""
+
+    units: ClassVar[dict[str, str]] = {"x": "m", "deformation_gradient": "-", "body": "-", "volume": "m^2", "J": "-"}
+    time = 0.0
+
+    def __init__(self, most):
+        X, turn = lattice(2, 12) - 0.5, np.array([[0.0, -1.0], [1.0, 0.0]])
+        angle = most * (X**2).sum(axis=1)
+        R = np.cos(angle)[:, None, None] * np.eye(2) + np.sin(angle)[:, None, None] * turn
+        x, F = np.einsum("nij,nj->ni", R, X), R + 2.0 * most * np.einsum("nij,jk,nk,nl->nil", R, turn, X, X)
+        apart = np.array([1 + 1 / 12, 0.0])
+        self.start, self.x, self.F = np.r_[X, X + apart], np.r_[x, x + 2.0 * apart], np.r_[F, F]
+        self.body, self.volume, self.J = np.repeat([0, 1], 144), np.full(288, 1 / 144), np.r_[angle, angle]
+
+    def __getitem__(self, name):
+        return getattr(self, name)
+
+    field = __getitem__
+
+
+def test_what_opens_between_cells_is_filled():
+    frame = Twisted(8.0)
+    triangles = sheet(frame, frame.start)
+    assert len(triangles) == 2 * 2 * 11 * 11 and (frame.body[triangles] == frame.body[triangles][:, :1]).all()
+    frame.x[:144] += 9.0 * np.random.default_rng(0).uniform(-1, 1, (144, 2))  # a liquid that has been stirred
+    assert 242 <= len(sheet(frame, frame.start)) < 270
+    assert len(sheet(frame, frame.start[:-1])) == 0  # a frame of other particles
+
+    def white(**options):
+        frame = Twisted(8.0)
+        shown = draw_frame(frame, fitted(Picture(field="J", size=(800, 400), **options), [frame]))
+        return (shown.min(axis=2) == 255).sum()
+
+    assert white(start=frame.start) < white() - 1000

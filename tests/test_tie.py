@@ -35,7 +35,8 @@ def tied(simulation, x, F):
 def pair_energy(simulation, x, F, modulus):
     """¼ Σ Σ χ Ē V_a w_ab |r_ab|² [J], in numpy."""
     reference, near = simulation.configuration.fields, simulation.configuration.near
-    X, V, w = reference.x.numpy(), reference.V.numpy(), near.w.numpy()
+    X, V, w, own = (array.numpy() for array in (reference.x, reference.V, near.w, near.own))
+    w = w + np.abs(w - own)
     a, b = np.repeat(np.arange(len(X)), np.diff(near.start.numpy())), near.index.numpy()
     r = x[b] - x[a] - 0.5 * np.einsum("nij,nj->ni", F[a] + F[b], X[b] - X[a])
     return 0.25 * modulus * (V[a] * w * (r**2).sum(axis=1)).sum()

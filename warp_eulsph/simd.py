@@ -131,6 +131,31 @@ BY_EIGHT = """
     }
 """
 
+#: The same with the larger of the tilted weights (M17) of both ends, w + |w − own|; expects ``own`` too.
+BY_EIGHT_LARGER = """
+    int k = begin;
+    for (; k + 8 <= end; k += 8) {
+        V eight_w, eight_own;
+        __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
+        __builtin_memcpy(&eight_own, own.data + k, sizeof(V));
+        eight_w += __builtin_elementwise_abs(eight_w - eight_own);
+        eight(index.data + k, eight_w);
+    }
+    if (k < end) {
+        int some[8];
+        V some_w = 0;
+        #pragma unroll
+        for (int i = 0; i < 8; ++i) {
+            some[i] = k + i < end ? index.data[k + i] : a;
+            if (k + i < end) {
+                const T less = w.data[k + i] - own.data[k + i];
+                some_w[i] = w.data[k + i] + (less > 0 ? less : -less);
+            }
+        }
+        eight(some, some_w);
+    }
+"""
+
 #: C++ that calls ``two(b, c, weights)`` for the neighbours of ``a``, two at a time; of an odd number the last one comes
 #: with ``a`` itself at weight zero. Expects begin, end, index and w among the arguments.
 BY_TWO = """

@@ -95,6 +95,7 @@ def _options(found: Any, arguments: argparse.Namespace) -> Any:
         spacing=spacing(first.x),
         title=found.title if arguments.title is None else arguments.title,
         outline=rim(first.x) if arguments.undeformed else None,
+        start=first.x,
         **view,
     )
 

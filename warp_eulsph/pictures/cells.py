@@ -4,6 +4,8 @@ import numpy as np
 
 from ..output.reader import RunFrame
 
+# Two particles of a body are next to each other within so many spacings, diagonals of cells among them.
+NEXT = 1.6
 SAMPLE = 100  # particles whose nearest neighbour is looked for
 
 
@@ -46,3 +48,33 @@ def corners(frame: RunFrame, size: float) -> np.ndarray:
         edges = (frame["volume"].astype(float) / np.abs(np.linalg.det(F))) ** (1.0 / dim)
     offsets = edges[:, None, None] * np.einsum("nij,kj->nki", F, unit)
     return x[:, None, :] + offsets
+
+
+def sheet(frame: RunFrame, start: np.ndarray) -> np.ndarray:
+    """Triangles between particles that were next to each other at the start and still are, (m, 3) of rows, in 2-D.
+
+    They fill what opens between cells where neighbours deform differently, however far the body is sheared. Left out
+    are those between bodies, and those that matter has left: edges of more than twice what the deformation gradient
+    made of them.
+
+    Args:
+        start: positions of the same particles at the start [m], (n, 2).
+    """
+    from matplotlib.tri import Triangulation
+
+    n = len(frame.x)
+    if n < 3 or start.shape != (n, 2) or "deformation_gradient" not in frame.units:
+        return np.zeros((0, 3), dtype=int)
+    try:
+        triangles = Triangulation(*start.astype(float).T).triangles
+    except RuntimeError:  # all in a line
+        return np.zeros((0, 3), dtype=int)
+    x, stretch = frame.x.astype(float), np.linalg.svd(frame.F.astype(float), compute_uv=False)[:, 0]
+    body = frame["body"] if "body" in frame.units else np.zeros(n)
+    kept, near = np.ones(len(triangles), dtype=bool), NEXT * spacing(start)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        first, second = triangles[:, a], triangles[:, b]
+        before, now = (np.linalg.norm(at[second] - at[first], axis=1) for at in (start, x))
+        kept &= (before < near) & (body[first] == body[second])
+        kept &= now < 2.0 * before * np.maximum(stretch[first], stretch[second])
+    return triangles[kept]

@@ -31,6 +31,8 @@ class Picture:
         size: width and height in pixels, even numbers for films; those that suit the extent if None.
         title: stands before the time.
         outline: positions of the outermost particles at the start [m], (k, 2), dotted beneath the body; in 2-D only.
+        start: positions of the particles at the start [m], (n, 2), by which what opens between cells that are sheared
+            far is filled, in 2-D; a film takes them from the first frame of its run.
         colours: a colour map of matplotlib.
         limits: least and largest value of the colours; those shown if None.
         spacing: edge of the cells at the start [m]; by default the spacing of the first frame that is drawn.
@@ -42,6 +44,7 @@ class Picture:
     size: tuple[int, int] | None = None
     title: str = ""
     outline: np.ndarray | None = None
+    start: np.ndarray | None = None
     colours: str = "viridis"
     limits: tuple[float, float] | None = None
     spacing: float | None = None
@@ -100,6 +103,8 @@ def film(
             f"{path}: an MP4 needs the program ffmpeg; install it or pip install imageio-ffmpeg, or choose a .gif"
         )
     which = range(len(run)) if frames is None else frames
+    if options.start is None and len(run):
+        options = replace(options, start=run[0].x)
     # Each frame is opened anew: a frame keeps what was read from it.
     chosen = fitted(options, (run[k] for k in which))
     images = (draw_frame(run[k], chosen) for k in which)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..output.reader import RunFrame
-from .cells import corners
+from .cells import corners, sheet
 from .quantity import quantity
 
 # Beneath the cells they are drawn larger by this factor, which fills the cracks between those that deformed differently
@@ -61,6 +61,11 @@ def draw_plane(frame: RunFrame, options: Any) -> np.ndarray:
 
     shown = quantity(frame, options.field)
     axes = figure.add_subplot()
+    if options.start is not None:
+        beneath = sheet(frame, options.start)
+        matter = PolyCollection(frame.x.astype(float)[beneath], array=shown.values[beneath].mean(axis=1))
+        matter.set(cmap=options.colours, edgecolor="face", linewidth=0.2, clim=options.limits)
+        axes.add_collection(matter)
     centres, own = frame.x.astype(float)[:, None], corners(frame, options.spacing)
     outlines: Any = np.concatenate([centres + OVERLAP * (own - centres), own])[:, OUTLINE]
     cells = PolyCollection(outlines, array=np.tile(shown.values, 2), cmap=options.colours)

@@ -9,7 +9,7 @@ import warp as wp
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..linalg import inverse
-from ..simd import BY_EIGHT, packed_rows, prelude
+from ..simd import BY_EIGHT_LARGER, packed_rows, prelude
 from ..space import Space, difference
 from .dissipation import blend, upwind
 from .flux import Flux
@@ -20,6 +20,21 @@ from .tie import Tie
 def _vectors(space: Space) -> int:
     """Rows of four: X with the impedance, u, v with the shear impedance, columns of −½(F − I) and of −½∇v F⁻¹."""
     return 3 + 2 * space.dim
+
+
+@functools.cache
+def _couple(space: Space) -> Any:
+    """``wp.func`` (τ, F) -> first Piola–Kirchhoff stress of M9 from τ = −½ Σ_b q_ab ⊗ ξ, q the pair forces.
+
+    It is that part of τ which answers the moments of the forces, the antisymmetric one.
+    """
+    real, mat, invert = space.real, space.mat, inverse(space)
+
+    @wp.func
+    def couple(tau: mat, F: mat) -> mat:
+        return (tau - wp.transpose(tau)) * real(0.5) @ wp.transpose(invert(F))
+
+    return couple
 
 
 @functools.cache
@@ -44,7 +59,11 @@ def _make_pack(space: Space) -> Any:
         X_a, v_a, grad_a = reference.x[a], v[a], grad_v[a] @ invert(F[a])
         u_a, H_a = x[a] - X_a, F[a] - wp.identity(n=wp.static(dim), dtype=real)
         rows[a, 3] = flux.impedance[a]
+        rows[a, 7] = real(0.0)
         rows[a, 11] = flux.shear_impedance[a]
+        for j in range(wp.static(dim)):
+            rows[a, first_H + 4 * j + 3] = real(0.0)
+            rows[a, first_grad + 4 * j + 3] = real(0.0)
         for i in range(wp.static(dim)):
             rows[a, i] = X_a[i]
             rows[a, 4 + i] = u_a[i]
@@ -61,23 +80,23 @@ def _make_simd(space: Space) -> Any:
     """Kernel of the pass from packed rows, without a sensor."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
+    Flux, Forces, couple_of = structure(space, "Flux"), structure(space, "Forces"), _couple(space)
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
     const Q* const all = (const Q*)rows.data;
-    const auto own = [&](int m, T sign) {{
+    const auto mine = [&](int m, T sign) {{
         Q q = all[(size_t)a * vectors + m];
         q[3] *= sign;
         return both(q, q);
     }};
     // impedances are added where the rest is subtracted
-    const V X_a = own(0, -1), u_a = own(1, 1), v_a = own(2, -1);
+    const V X_a = mine(0, -1), u_a = mine(1, 1), v_a = mine(2, -1);
     V H_a[dim], grad_a[dim], tie[dim], drag[dim], tied[dim * dim], dragged[dim * dim];
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
-        H_a[j] = own(3 + j, 1);
-        grad_a[j] = own(3 + dim + j, 1);
+        H_a[j] = mine(3 + j, 1);
+        grad_a[j] = mine(3 + dim + j, 1);
         tie[j] = drag[j] = 0;
     }}
     #pragma unroll
@@ -124,7 +143,7 @@ def _make_simd(space: Space) -> Any:
             }}
         }}
     }};
-    {BY_EIGHT}
+    {BY_EIGHT_LARGER}
     #pragma unroll
     for (int i = 0; i < dim; ++i) {{
         ties.data[a].c[i] = total(tie[i]) * V_a;
@@ -144,6 +163,7 @@ def _make_simd(space: Space) -> Any:
         end: int,
         index: wp.array(dtype=int),
         w: wp.array(dtype=real),
+        own: wp.array(dtype=real),
         box: vec,
         rows: wp.array2d(dtype=real),
         modulus: real,
@@ -169,11 +189,10 @@ def _make_simd(space: Space) -> Any:
     ):
         a = first + wp.tid()
         begin, end, V_a = near.start[a], near.start[a + 1], reference.V[a]
+        index, w, own, box = near.index, near.w, near.own, near.box
         tie, drag = forces.tie, forces.dissipation
-        sum_pairs(
-            a, begin, end, near.index, near.w, near.box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag
-        )
-        flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
+        sum_pairs(a, begin, end, index, w, own, box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag)
+        flux.drag[a] = couple_of(flux.drag[a], F[a])
         flux.Q[a] = flux.Q[a] + flux.tie[a] + flux.drag[a]
 
     return pair_potentials_simd
@@ -196,12 +215,12 @@ def _make_spatial(space: Space) -> Any:
 def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
     """Kernel of the pass; M9 where ``damped``, of D = ∇v F⁻¹, reconstructed only where v is smooth if ``sensed``.
 
-    What is not reconstructed leaves no stress. Π is kept with ``dual``.
+    Π is kept with ``dual``.
     """
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
-    separation, pair_force, mix, invert = difference(space), upwind(space), blend(space), inverse(space)
+    separation, pair_force, mix, couple_of = difference(space), upwind(space), blend(space), _couple(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def pair_potentials(
@@ -226,26 +245,26 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
             xi = separation(reference.x[b], reference.x[a], near.box)
             # by displacements: in a periodic box the nearest image of a strained pair may be another
             now = xi + ((x[b] - reference.x[b]) - (x[a] - reference.x[a]))
-            pull = (now - (F[a] + F[b]) @ (xi * real(0.5))) * (modulus * near.w[k])
+            w = near.w[k] + wp.abs(near.w[k] - near.own[k])
+            pull = (now - (F[a] + F[b]) @ (xi * real(0.5))) * (modulus * w)
             tie += pull
             tied += wp.outer(pull, xi)
             if wp.static(damped):
                 plain = v[b] - v[a]
-                smooth = (plain - (D[a] + D[b]) @ (now * real(0.5))) * epsilon
-                jump = smooth
+                jump = (plain - (D[a] + D[b]) @ (now * real(0.5))) * epsilon
                 if wp.static(sensed):
-                    jump = mix(smooth, plain, real(1.0), sensor[a], sensor[b])
-                    smooth = mix(smooth, vec(), real(1.0), sensor[a], sensor[b])
+                    jump = mix(jump, plain, real(1.0), sensor[a], sensor[b])
                 Z = flux.impedance[a] + flux.impedance[b]
                 Z_shear = flux.shear_impedance[a] + flux.shear_impedance[b]
-                drag += pair_force(xi, now, near.w[k], Z, Z_shear, jump)
-                dragged += wp.outer(pair_force(xi, now, near.w[k], Z, Z_shear, smooth), now)
+                push = pair_force(xi, now, w, Z, Z_shear, jump)
+                drag += push
+                dragged += wp.outer(push, now)
         forces.tie[a] = tie * reference.V[a]
         flux.tie[a] = tied * real(-0.5)
         flux.Q[a] = flux.Q[a] + flux.tie[a]
         if wp.static(damped):
             forces.dissipation[a] = drag * reference.V[a]
-            flux.drag[a] = (dragged * real(-0.5)) @ wp.transpose(invert(F[a]))
+            flux.drag[a] = couple_of(dragged * real(-0.5), F[a])
             flux.Q[a] = flux.Q[a] + flux.drag[a]
         if wp.static(dual):
             flux.Pi[a] = flux.Q[a] @ wp.transpose(reference.L[a])
@@ -256,9 +275,9 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
 class PairPotentials:
     """The pass at work on a medium whose arrangement does not move: a stress beside every force.
 
-    The forces are derivatives of a potential of positions and F (M16), and of one of velocities and ∇v F⁻¹ (M9) with
-    the pairs as they are now. What they do to F goes through the stress, so that energy and both momenta find all of
-    it; neither potential knows of a rotation.
+    The tie's forces are derivatives of a potential of positions and F (M16), and so is its stress. Dissipation (M9) takes
+    the pairs as they are now and ∇v F⁻¹, and has a stress that answers the moments of its forces. So energy and both
+    momenta are exact with both.
 
     Args:
         tie: None ties nothing.

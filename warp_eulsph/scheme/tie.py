@@ -21,7 +21,7 @@ class Tie:
             make coarse bodies stiffer, and their F worse near edges (docs/method.md, §7).
     """
 
-    stiffness: float = 0.5
+    stiffness: float = 1.0
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.stiffness) and 0.0 < self.stiffness <= 1.0):
