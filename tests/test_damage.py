@@ -195,6 +195,13 @@ ODD = {
 }
 
 
+CASE = (
+    'until = 1e-3\n[parameters]\nn = 4\n[body.block]\nshape = { kind = "box", lower = [0, 0], upper = [1, 1], '
+    'spacing = "1/n" }\nmaterial = { kind = "NeoHookean", density = 1100, young = 17e6, poisson = 0.45 }\n'
+    'velocity = ["10*y", 0]\n[output]\nevery = 4e-4\n[[probe]]\nkind = "BodyProbe"\nname = "whole"\n'
+)
+
+
 def mutated(directory, seed):
     """Do one to three of many things to the folder; what was done."""
     rng, done = random.Random(seed), []
@@ -248,11 +255,7 @@ def mutated(directory, seed):
 
 def test_mutated_folders_are_never_a_traceback_and_lose_nothing_whole(tmp_path, capsys):
     case = tmp_path / "plate.toml"
-    case.write_text(
-        'until = 1e-3\n[parameters]\nn = 4\n[body.block]\nshape = { kind = "box", lower = [0, 0], upper = [1, 1], '
-        'spacing = "1/n" }\nmaterial = { kind = "NeoHookean", density = 1100, young = 17e6, poisson = 0.45 }\n'
-        'velocity = ["10*y", 0]\n[output]\nevery = 4e-4\n[[probe]]\nkind = "BodyProbe"\nname = "whole"\n'
-    )
+    case.write_text(CASE)
     assert main(["run", str(case), "-o", str(tmp_path / "run")]) == 0
     whole = {path.read_bytes() for path in files(tmp_path / "run") if path.suffix in (".vtkhdf", ".h5")}
     for seed in range(int(os.environ.get("WARP_EULSPH_MUTATIONS", "20"))):

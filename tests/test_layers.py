@@ -158,7 +158,8 @@ def test_start_does_not_load_hdf5_pictures_or_meshes(code):
 
 def test_cases_run_without_any_extra(tmp_path):
     """As after a plain ``pip install warp_eulsph``: what pictures, meshes and data sets need is not there."""
-    extras = ("matplotlib", "PIL", "pyvista", "vtkmodules", "meshio", "xarray", "pandas", "scipy", "imageio_ffmpeg")
+    extras = ("matplotlib", "PIL", "pyvista", "vtkmodules", "meshio", "trimesh", "manifold3d", "xarray", "pandas")
+    extras += ("scipy", "imageio_ffmpeg")
     code = (
         f"import sys\nfor name in {extras}: sys.modules[name] = None\n"
         "from warp_eulsph.cli import main\n"

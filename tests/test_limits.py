@@ -145,6 +145,7 @@ def test_memory_groups_are_seen_in_both_versions(tmp_path):
 def test_intervals_that_nobody_can_wait_for_are_refused(interval, tmp_path):
     for go in (
         lambda: plate().run(1.0, every=interval, output=tmp_path / "run"),
+        lambda: plate().run(1.0, every=interval),
         lambda: record(plate(), tmp_path / "run", 1.0, recording(plate(), probes=[], snapshots=EveryTime(interval))),
     ):
         with pytest.raises(ValueError, match=r"interval must be at least 1/1e\+09 of the time from 0"):

@@ -45,7 +45,7 @@ def checked_dtype(given: Any) -> Any:
         return given
     try:
         meant = {"float32": "wp.float32", "float64": "wp.float64"}.get(np.dtype(given).name)
-    except TypeError:
+    except (TypeError, ValueError):  # numpy's, of what is no type
         meant = None
     hint = f"; write dtype={meant}" if meant else ""
     raise ValueError(f"dtype must be wp.float32 or wp.float64, got {short(given)}{hint}")

@@ -150,6 +150,7 @@ class Simulation(Looks):
         if not (np.isfinite(real_number(until, "until")) and until >= self.t):
             raise ValueError(f"until must be finite and not before the present time {self.t} s, got {until}")
         frames = AtTimes() if every is None else EveryTime(every, self.t)
+        frames.check(self.t, until)
         with Bar(self, until, progress) as self.watch:
             if output is None:
                 self._advance(until)

@@ -7,7 +7,8 @@ from importlib import metadata
 
 # What the package needs, and what its extras bring.
 NEEDED = ("warp_eulsph", "warp-lang", "numpy", "h5py", "filelock", "tqdm", "pydantic")
-EXTRAS = {"matplotlib": "viz", "pyvista": "viz", "meshio": "mesh", "xarray": "xarray", "shtab": "completion"}
+EXTRAS = {"matplotlib": "viz", "pyvista": "viz", "meshio": "mesh", "trimesh": "mesh", "manifold3d": "mesh"}
+EXTRAS |= {"xarray": "xarray", "shtab": "completion"}
 
 # The block that is timed: 3-D, of so many particles along a side, for so many steps after one that compiles.
 SIDE, STEPS = 16, 20

@@ -73,7 +73,10 @@ def surface_triangles(kind: str, cells: np.ndarray) -> tuple[np.ndarray, np.ndar
 def outer_triangles(points: np.ndarray, cells: dict[str, np.ndarray]) -> np.ndarray:
     """Triangles, (m, 3), outwards, of the faces that belong to one solid element only."""
     pieces: dict[int, list[np.ndarray]] = {}
-    points = points - points.mean(axis=0)  # for the sign of volumes far from the origin
+    used = [nodes.ravel() for kind, nodes in cells.items() if kind in SOLIDS]
+    if not used:
+        return np.zeros((0, 3), dtype=int)
+    points = points - points[np.unique(np.concatenate(used))].mean(axis=0)  # for volumes far from the origin
     for kind, nodes in cells.items():
         if kind not in SOLIDS or not len(nodes):
             continue

@@ -109,7 +109,7 @@ def _by_trimesh(path: str | PathLike, scale: float) -> MeshFile | None:
 
         mesh = _quietly(trimesh.load_mesh, path, process=False)
         points, triangles = scale * np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=int)
-    except Exception:  # as meshio it raises what its readers stumble over, and it may not be installed
+    except (Exception, SystemExit):  # as meshio it raises what its readers stumble over, and it may not be installed
         return None
     if not len(triangles) or points.shape[1:] != (3,) or not np.isfinite(points).all():
         return None
@@ -124,7 +124,7 @@ def _by_pyvista(path: str | PathLike, scale: float) -> MeshFile | None:
         read = _quietly(pyvista.read, path)
         surface = _quietly(lambda: read.extract_surface().triangulate())
         points, triangles = scale * np.asarray(surface.points, dtype=float), surface.faces.reshape(-1, 4)[:, 1:]
-    except Exception:
+    except (Exception, SystemExit):
         return None
     if not len(triangles) or not np.isfinite(points).all():
         return None

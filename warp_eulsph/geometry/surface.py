@@ -42,6 +42,12 @@ class Surface:
         return corners.min(axis=0), corners.max(axis=0)
 
     @property
+    def _centre(self) -> np.ndarray:
+        """Of the box [m], (3,); points that no triangle has may be anywhere."""
+        lower, upper = self.extent
+        return 0.5 * (lower + upper)
+
+    @property
     def area(self) -> float:
         """[m²]."""
         return float(np.linalg.norm(self._doubled_areas(), axis=1).sum()) / 2.0
@@ -54,7 +60,7 @@ class Surface:
     @property
     def volume(self) -> float:
         """Volume inside [m³], by the divergence theorem; negative when the triangles face inwards."""
-        corners = (self.points - self.points.mean(axis=0))[self.triangles]
+        corners = self.points[self.triangles] - self._centre
         return float(np.einsum("mi,mi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
 
     def simplified(self) -> "Surface":
@@ -136,13 +142,13 @@ class Surface:
         With ``winding``, ½ for what is inside, the distance is negative where the winding number is less; such a
         surface must be closed. In single precision, that of Warp's meshes, about the surface's centre.
         """
-        centre = 0.5 * (self.points.min(axis=0) + self.points.max(axis=0))
+        centre = self._centre
         mesh = wp.Mesh(
             points=wp.array((self.points - centre).astype(np.float32), dtype=wp.vec3, device="cpu"),
             indices=wp.array(self.triangles.astype(np.int32).ravel(), dtype=wp.int32, device="cpu"),
             support_winding_number=winding is not None,
         )
-        reach = float(np.linalg.norm(np.ptp(self.points, axis=0)))
+        reach = float(np.linalg.norm(np.ptp(self.extent, axis=0)))
 
         def distance(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             places = wp.array((x - centre).astype(np.float32), dtype=wp.vec3, device="cpu")
@@ -227,7 +233,7 @@ def _joined(file: np.ndarray, triangles: np.ndarray, groups: dict[str, np.ndarra
     same = weld(points, WELD * float(np.ptp(used, axis=0).max()) if tolerance is None else tolerance)
     first = np.unique(same, return_index=True)[1]
     near = _welded(points[first], same[places.reshape(-1)], triangles, groups)
-    better = len(near.triangles) and not len(near.open_edges())
+    better = len(near.triangles) and len(near.open_edges()) <= len(surface.open_edges())
     return near if better or tolerance is not None else surface
 
 

@@ -275,9 +275,9 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
 class PairPotentials:
     """The pass at work on a medium whose arrangement does not move: a stress beside every force.
 
-    The tie's forces are derivatives of a potential of positions and F (M16), and so is its stress. Dissipation (M9) takes
-    the pairs as they are now and ∇v F⁻¹, and has a stress that answers the moments of its forces. So energy and both
-    momenta are exact with both.
+    The tie's forces are derivatives of a potential of positions and F (M16), and so is its stress. Dissipation (M9)
+    takes the pairs as they are now and ∇v F⁻¹, and has a stress that answers the moments of its forces. So energy and
+    both momenta are exact with both.
 
     Args:
         tie: None ties nothing.
