@@ -32,7 +32,7 @@ def test_a_fixed_reference_keeps_no_search_and_finds_its_neighbours_again():
     simulation = es.Simulation(block(2, SIDE[2]), reference=es.Never())
     lists = simulation.configuration.lists
     before = lists.rows.index.numpy().copy(), simulation.configuration.fields.L.numpy().copy()
-    searching = memory.array_bytes(lists) - 4 * (len(lists.rows.index) + len(lists.rows.start)) - 8 * len(lists.rows.w)
+    searching = memory.array_bytes(lists) - 4 * (len(lists.rows.index) + len(lists.rows.start)) - 16 * len(lists.rows.w)
     assert searching < 16 * len(simulation.x)  # h and bodies, which are the particles'
     simulation.stepper.rebuild()  # as after a restore
     assert np.array_equal(lists.rows.index.numpy(), before[0])

@@ -28,6 +28,7 @@ PARTICLES = {
     "h": Field("real", "m", "initial smoothing length, dilation times spacing"),
     "spacing": Field("real", "m", "initial particle spacing"),
     "share": Field("real", "-", "1; 0 for ghosts, which energies and momenta leave out"),
+    "outward": Field("vec", "m^(d-1)", "area vector e_a at the start, of weights without tilt (M17): which way out is"),
     "body": Field("int", "-", "number of the body"),
     "group": Field("int", "-", "number of what is bonded together; only particles of one are neighbours"),
 }

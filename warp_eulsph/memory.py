@@ -30,7 +30,8 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
     absent = {"Forces.correction", "Forces.external"} | ({"Flux.Pi"} if vectors else set())
-    absent |= {"Reference.resolution", "Flux.tie", "Forces.tie"} if moving else {"Reference.F", "Reference.balanced"}
+    moved = {"Reference.resolution", "Reference.moment", "Flux.tie", "Flux.drag", "Forces.tie"}
+    absent |= moved if moving else {"Reference.F", "Reference.balanced"}
     present = [
         field for group, fields in GROUPS.items() for name, field in fields.items() if f"{group}.{name}" not in absent
     ]
@@ -39,7 +40,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
     if vectors:
         reals += LANES * (3 + 2 * d)
     if not moving:
-        reals += LANES * (1 + d)
+        reals += LANES * d if vectors else d * d  # of Π, or ∇v F⁻¹
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1
@@ -48,7 +49,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
         ints += 6
     item = wp.types.type_size_in_bytes(space.real)
     neighbours = min(math.pi ** (d / 2) / math.gamma(d / 2 + 1) * min(reach, 1e99) ** d, n)
-    return reals * item + 4 * ints + 8 * doubles + neighbours * (4 + item) * (1.25 if moving else 1.0)
+    return reals * item + 4 * ints + 8 * doubles + neighbours * ((4 + item) * 1.25 if moving else 4 + 2 * item)
 
 
 def available(device: Any) -> int | None:

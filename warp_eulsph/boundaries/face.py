@@ -70,7 +70,7 @@ def find_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Fac
         # those that look away a little carry no load, but have their share of the area vectors beneath the rim
         tops, bottoms = sloping(body, n, -RIM_SLOPE), sloping(body, -n, RIM_SLOPE)
         a, b = pairs(body.x[tops], body.x[surface_particles(body)], SMOOTH * body.spacing)
-        mean = np.bincount(a, body.s[surface_particles(body)[b]] @ n)  # the steps of a cut lattice look anywhere
+        mean = np.bincount(a, body.outward[surface_particles(body)[b]] @ n)  # the steps of a cut lattice look anywhere
         held = chosen[tops] & (mean > 0.0)
     if not held.any():
         raise ValueError(
@@ -240,16 +240,15 @@ def surfaces_held(
     Ghosts are not. To be asked for at the start of a run.
     """
     by_number, particles = assembly.order.by_number, assembly.particles
-    s, V, spacing = (
-        by_number(array.numpy()).astype(float) for array in (state.surface, particles.V0, particles.spacing)
-    )
+    arrays = (state.surface, particles.outward, particles.V0, particles.spacing)
+    s, outward, V, spacing = (by_number(array.numpy()).astype(float) for array in arrays)
     chosen = np.zeros(len(assembly.X), dtype=bool)
     chosen[indices] = True
     chosen &= by_number(particles.share.numpy()) > 0.0
     return [
         (
             own,
-            Surface(assembly.X[own], V[own], float(spacing[own].mean()), s[own], assembly.surface_given),
+            Surface(assembly.X[own], V[own], float(spacing[own].mean()), s[own], outward[own], assembly.surface_given),
             chosen[own],
         )
         for name, own in assembly.bodies.items()

@@ -23,6 +23,7 @@ class Surface:
         x: initial positions [m], (n, dim). V: initial volumes [m^dim], (n,).
         spacing: mean particle spacing [m].
         s: initial area vectors [m^(dim−1)], (n, dim).
+        outward: the same of weights without tilt (M17), which say where out is.
         exact: the vectors came with the body: they are the true ones, particle by particle.
         found: outermost particles that were looked for, by normal.
     """
@@ -31,6 +32,7 @@ class Surface:
     V: np.ndarray
     spacing: float
     s: np.ndarray
+    outward: np.ndarray
     exact: bool
     found: dict[bytes, np.ndarray] = field(default_factory=dict)
 
@@ -42,7 +44,7 @@ class Surface:
 
 def along(body: Surface, particles: np.ndarray) -> np.ndarray:
     """Directions of the area vectors of some particles, (k, dim)."""
-    s = body.s[particles]
+    s = body.outward[particles]
     return s / np.linalg.norm(s, axis=1, keepdims=True)
 
 
@@ -56,7 +58,7 @@ def along_and_beside(body: Surface, a: np.ndarray, b: np.ndarray, n: np.ndarray)
 def surface_particles(body: Surface) -> np.ndarray:
     """Particles with none above them along their own area vectors, sorted."""
     if b"" not in body.found:
-        length = np.linalg.norm(body.s, axis=1)
+        length = np.linalg.norm(body.outward, axis=1)
         skin = np.flatnonzero(length > (0.0 if body.exact else LARGE) * body.size)
         body.found[b""] = skin if body.exact else skin[~_blocked(body, skin, along(body, skin))]
     return body.found[b""]
@@ -66,8 +68,8 @@ def outermost(body: Surface, n: np.ndarray) -> np.ndarray:
     """Particles with none above them along ``n``, sorted."""
     key = n.tobytes()
     if key not in body.found:
-        large = np.linalg.norm(body.s, axis=1) > LARGE * body.size
-        facing = body.s @ n > FACING * body.size
+        large = np.linalg.norm(body.outward, axis=1) > LARGE * body.size
+        facing = body.outward @ n > FACING * body.size
         tops = np.flatnonzero(facing if body.exact else facing & large)
         normals = np.broadcast_to(n, (len(tops), len(n)))
         body.found[key] = tops if body.exact else tops[~_blocked(body, tops, normals)]

@@ -138,6 +138,11 @@ class Medium:
         nothing_yet = self.forces.free_v
         self.configuration.defect(nothing_yet, self.of(state).surface)
 
+    def look_outward(self, state: Any) -> None:
+        """Which way out is: by the area vectors, unless weights are tilted."""
+        if self.configuration.tilt is None:
+            wp.copy(self.particles.outward, self.of(state).surface)
+
     def move(self, state: Any) -> None:
         """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
         self.flux.rebase(self.of(state).F)

@@ -104,6 +104,7 @@ class World:
             medium.start(self.U)
             if not given:
                 medium.find_surface(self.U)
+            medium.look_outward(self.U)
         for condition in self.conditions:
             condition.start(self.U)
         for medium in self.media:
