@@ -120,7 +120,7 @@ def highest_frequency(x, tilt):
         stepper.U.v.zero_()
         stepper.U.x.assign(x + u)
         stepper.U.F.assign(np.eye(dim) + gradient)
-        stepper._stress(stepper.U)
+        stepper._stress(stepper.U, 0.0)
         stepper._sum_forces(stepper.U, stepper.U, 0.0)
         acceleration = stepper.forces.internal.numpy() + stepper.forces.tie.numpy()
         rate, u = np.linalg.norm(acceleration) / np.linalg.norm(u), -acceleration

@@ -23,21 +23,6 @@ def _vectors(space: Space) -> int:
 
 
 @functools.cache
-def _couple(space: Space) -> Any:
-    """``wp.func`` (τ, F) -> first Piola–Kirchhoff stress of M9 from τ = −½ Σ_b q_ab ⊗ ξ, q the pair forces.
-
-    It is that part of τ which answers the moments of the forces, the antisymmetric one.
-    """
-    real, mat, invert = space.real, space.mat, inverse(space)
-
-    @wp.func
-    def couple(tau: mat, F: mat) -> mat:
-        return (tau - wp.transpose(tau)) * real(0.5) @ wp.transpose(invert(F))
-
-    return couple
-
-
-@functools.cache
 def _make_pack(space: Space) -> Any:
     """Kernel: what the SIMD pass reads of a neighbour, side by side."""
     real, vec, mat, dim, invert = space.real, space.vec, space.mat, space.dim, inverse(space)
@@ -80,7 +65,7 @@ def _make_simd(space: Space) -> Any:
     """Kernel of the pass from packed rows, without a sensor."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    Flux, Forces, couple_of = structure(space, "Flux"), structure(space, "Forces"), _couple(space)
+    Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
@@ -192,7 +177,7 @@ def _make_simd(space: Space) -> Any:
         index, w, own, box = near.index, near.w, near.own, near.box
         tie, drag = forces.tie, forces.dissipation
         sum_pairs(a, begin, end, index, w, own, box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag)
-        flux.drag[a] = couple_of(flux.drag[a], F[a])
+        flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
         flux.Q[a] = flux.Q[a] + flux.tie[a] + flux.drag[a]
 
     return pair_potentials_simd
@@ -220,7 +205,7 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
-    separation, pair_force, mix, couple_of = difference(space), upwind(space), blend(space), _couple(space)
+    separation, pair_force, mix, invert = difference(space), upwind(space), blend(space), inverse(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def pair_potentials(
@@ -264,7 +249,7 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
         flux.Q[a] = flux.Q[a] + flux.tie[a]
         if wp.static(damped):
             forces.dissipation[a] = drag * reference.V[a]
-            flux.drag[a] = couple_of(dragged * real(-0.5), F[a])
+            flux.drag[a] = dragged * real(-0.5) @ wp.transpose(invert(F[a]))
             flux.Q[a] = flux.Q[a] + flux.drag[a]
         if wp.static(dual):
             flux.Pi[a] = flux.Q[a] @ wp.transpose(reference.L[a])
@@ -275,9 +260,8 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
 class PairPotentials:
     """The pass at work on a medium whose arrangement does not move: a stress beside every force.
 
-    The tie's forces are derivatives of a potential of positions and F (M16), and so is its stress. Dissipation (M9)
-    takes the pairs as they are now and ∇v F⁻¹, and has a stress that answers the moments of its forces. So energy and
-    both momenta are exact with both.
+    Forces and stresses are derivatives of a potential of positions and F (M16), and of one of velocities and ∇v F⁻¹
+    with the pairs as they are now (M9). So energy and both momenta find all of them, and neither knows of a rotation.
 
     Args:
         tie: None ties nothing.

@@ -40,6 +40,10 @@ class TimeStep:
             raise ValueError(f"fixed time step must be positive and finite, got {self.fixed} s")
 
 
+# From how many steps before a time that must be hit on they are of one length: a step less than 1/32 shorter is enough
+EVEN = 32.0
+
+
 @functools.cache
 def _make_choose(space: Space) -> Any:
     Clock = clock_structure(space)
@@ -61,8 +65,9 @@ def _make_choose(space: Space) -> Any:
         left = clock.target[0] - clock.t[0]
         if dt >= left * (wp.float64(1.0) - wp.float64(1.0e-10)):
             dt = wp.max(left, wp.float64(0.0))
-        elif dt > wp.float64(0.5) * left and fixed == wp.float64(0.0):
-            dt = wp.float64(0.5) * left  # two even steps instead of a long and a tiny one
+        elif dt * wp.float64(EVEN) > left and fixed == wp.float64(0.0):
+            # Even steps to the target instead of long ones and a short one, which again and again swing modes up
+            dt = left / wp.ceil(left / dt * (wp.float64(1.0) - wp.float64(1.0e-10)))
         clock.dt[0] = dt
         clock.added[0] = wp.float64(0.0)  # asked for anew before the next step
 
