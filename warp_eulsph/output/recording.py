@@ -53,7 +53,8 @@ class Recording:
     def __post_init__(self) -> None:
         if isinstance(self.fields, str):
             raise ValueError(f"fields must be a list of names, got {self.fields!r}; write [{self.fields!r}]")
-        object.__setattr__(self, "fields", None if self.fields is None else tuple(self.fields))
+        if self.fields is not None:
+            object.__setattr__(self, "fields", tuple(objects(self.fields, str, "fields", '"v", "J"')))
         object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
         object.__setattr__(self, "probes", tuple(objects(self.probes, Probe, "probes", "BodyProbe(name='whole')")))
         names = [probe.name for probe in self.probes]

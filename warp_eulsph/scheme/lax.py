@@ -29,7 +29,7 @@ class Lax(Scheme):
     """
 
     smoothing: Smoothing = NeighbourAverage()
-    dissipation: Upwind | None = Upwind()
+    dissipation: Upwind | None = Upwind(stress=False)
     correction: Correction | None = Balance()
     cfl: ClassVar[float] = 0.4
 

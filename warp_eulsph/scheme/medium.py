@@ -98,8 +98,8 @@ class Medium:
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            simd = self.configuration.simd and not sensed
-            self.pairs = PairPotentials(options.tie, plain, simd, space, self.flux, parts.groups, device)
+            simd, upwind = self.configuration.simd and not sensed, options.dissipation if plain else None
+            self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
         self.limiter: MassDiffusion | None = None

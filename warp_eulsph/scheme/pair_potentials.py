@@ -11,7 +11,7 @@ from ..fields import neighbour_structure, structure
 from ..linalg import inverse
 from ..simd import BY_EIGHT_LARGER, packed_rows, prelude
 from ..space import Space, difference
-from .dissipation import blend, upwind
+from .dissipation import Upwind, blend, upwind
 from .flux import Flux
 from .reference import Configuration
 from .tie import Tie
@@ -61,8 +61,8 @@ def _make_pack(space: Space) -> Any:
 
 
 @functools.cache
-def _make_simd(space: Space) -> Any:
-    """Kernel of the pass from packed rows, without a sensor."""
+def _make_simd(space: Space, stressed: bool) -> Any:
+    """Kernel of the pass from packed rows, without a sensor; M9 has a stress where ``stressed``."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
@@ -177,8 +177,11 @@ def _make_simd(space: Space) -> Any:
         index, w, own, box = near.index, near.w, near.own, near.box
         tie, drag = forces.tie, forces.dissipation
         sum_pairs(a, begin, end, index, w, own, box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag)
-        flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
-        flux.Q[a] = flux.Q[a] + flux.tie[a] + flux.drag[a]
+        drag_stress = mat()
+        if wp.static(stressed):
+            drag_stress = flux.drag[a] @ wp.transpose(invert(F[a]))
+        flux.drag[a] = drag_stress
+        flux.Q[a] = flux.Q[a] + flux.tie[a] + drag_stress
 
     return pair_potentials_simd
 
@@ -197,7 +200,7 @@ def _make_spatial(space: Space) -> Any:
 
 
 @functools.cache
-def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
+def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dual: bool) -> Any:
     """Kernel of the pass; M9 where ``damped``, of D = ∇v F⁻¹, reconstructed only where v is smooth if ``sensed``.
 
     Π is kept with ``dual``.
@@ -249,8 +252,9 @@ def _make_portable(space: Space, damped: bool, sensed: bool, dual: bool) -> Any:
         flux.Q[a] = flux.Q[a] + flux.tie[a]
         if wp.static(damped):
             forces.dissipation[a] = drag * reference.V[a]
-            flux.drag[a] = dragged * real(-0.5) @ wp.transpose(invert(F[a]))
-            flux.Q[a] = flux.Q[a] + flux.drag[a]
+            if wp.static(stressed):
+                flux.drag[a] = dragged * real(-0.5) @ wp.transpose(invert(F[a]))
+                flux.Q[a] = flux.Q[a] + flux.drag[a]
         if wp.static(dual):
             flux.Pi[a] = flux.Q[a] @ wp.transpose(reference.L[a])
 
@@ -265,17 +269,26 @@ class PairPotentials:
 
     Args:
         tie: None ties nothing.
-        damped: whether M9 is among them; where a correction changes M5 (M10 to M12), M9 comes with that.
+        dissipation: M9; None where a correction changes M5 (M10 to M12), with which M9 comes then.
         simd: whether the pass runs by SIMD kernels, which know of no sensor.
         groups: number of each body, equal for those that are bonded: they have the modulus of the softest, so that
             pairs across the joint find the same at both ends.
     """
 
     def __init__(
-        self, tie: Tie | None, damped: bool, simd: bool, space: Space, flux: Flux, groups: Sequence[int], device: Any
+        self,
+        tie: Tie | None,
+        dissipation: Upwind | None,
+        simd: bool,
+        space: Space,
+        flux: Flux,
+        groups: Sequence[int],
+        device: Any,
     ):
         self.space, self.flux, self._launch = space, flux, Launcher(device)
+        damped = dissipation is not None
         self._damped, self._simd = damped, simd and damped
+        self._stressed = dissipation is not None and dissipation.stress
         n = len(flux.fields.Q)
         moduli = [tie.modulus(M, mu, space.dim) if tie is not None else 0.0 for M, mu in flux.moduli()]
         softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
@@ -303,11 +316,11 @@ class PairPotentials:
             self._launch(_make_pack(self.space), len(v), arguments)
             for body, modulus in self._bodies:
                 arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
-                self._launch(_make_simd(self.space), len(body), arguments, body.start)
+                self._launch(_make_simd(self.space, self._stressed), len(body), arguments, body.start)
             return
         if self._damped:
             self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
-        kernel = _make_portable(self.space, self._damped, sensor is not None, len(flux.Pi) > 0)
+        kernel = _make_portable(self.space, self._damped, self._stressed, sensor is not None, len(flux.Pi) > 0)
         for body, modulus in self._bodies:
             arguments = [reference, near, state.x, state.F, v, self._D, v if sensor is None else sensor]
             self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)
