@@ -24,12 +24,13 @@ class Upwind:
             zero-energy modes grow.
         sensor: where it sees oscillations, the jump is not reconstructed (first-order upwind); None never does that.
         stress: whether what the forces do to gradients goes through the stress, where the arrangement does not move:
-            angular momentum is exact then, and smooth waves lose less, too little for the midpoint rule (M8).
+            angular momentum is exact then, and smooth waves lose less: too little for the midpoint rule (M8), and for
+            shocks and waves that a few particles must carry.
     """
 
     epsilon: float = 1.0
     sensor: Sensor | None = None
-    stress: bool = True
+    stress: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.epsilon <= 2.0:

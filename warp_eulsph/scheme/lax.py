@@ -29,7 +29,7 @@ class Lax(Scheme):
     """
 
     smoothing: Smoothing = NeighbourAverage()
-    dissipation: Upwind | None = Upwind(stress=False)
+    dissipation: Upwind | None = Upwind()
     correction: Correction | None = Balance()
     cfl: ClassVar[float] = 0.4
 

@@ -35,7 +35,7 @@ class LaxWendroff(Scheme):
     """
 
     smoothing: Smoothing | None = None
-    dissipation: Upwind | None = Upwind(stress=False)
+    dissipation: Upwind | None = Upwind()
     correction: Correction | None = Balance()
     limiter: FluxCorrectedTransport | None = None
     shifting: Shifting | None = None
