@@ -151,7 +151,7 @@ def test_the_step_bears_it():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_dissipation_with_its_stress_takes_no_angular_momentum(dim):
-    """M9 with ``stress=True``: a block spun about, jittered, with a velocity that is rough from particle to particle."""
+    """M9 with ``stress=True``: a jittered block spun about, with a velocity that is rough from particle to particle."""
     x = cloud(dim, 0.1)
     middle = x - x.mean(axis=0)
     v = 0.2 * np.random.default_rng(5).normal(size=x.shape)
