@@ -167,7 +167,43 @@ def test_dissipation_with_its_stress_takes_no_angular_momentum(dim):
     assert drift < 1e-13
 
 
+def test_a_thin_beam_five_across_sags_as_it_should():
+    """0.35 m × 0.02 m of Saint Venant–Kirchhoff under g = 2 m/s²: 0.129 m at most.
+
+    Without tilt it sags 26 % too far.
+    """
+    along, across = (np.arange(88) + 0.5) * (0.35 / 88), (np.arange(5) + 0.5) * 0.004
+    x, volume = np.stack(np.meshgrid(along, across, indexing="ij"), axis=-1).reshape(-1, 2), 0.35 / 88 * 0.004
+    material = es.SaintVenantKirchhoff(density=1000.0, young=1.4e6, poisson=0.4)
+    body = es.Body(x=x, volume=volume, spacing=0.004, material=material)
+    clamp = es.Clamped(point=(0.0, 0.0), normal=(-1.0, 0.0))
+    made = es.Simulation(body, boundaries=[clamp, es.Gravity(2.0)])
+    tip = np.argsort(np.linalg.norm(x - [0.35, 0.01], axis=1))[:2]
+    sag = 0.0
+    for t in np.arange(0.4, 0.53, 0.01):
+        made.run(t)
+        sag = max(sag, (x[tip, 1] - made.x[tip, 1]).mean())
+    assert sag == pytest.approx(0.129, rel=0.08)
+
+
 @pytest.mark.parametrize("most", [0.0, -1.0, 3.5, np.nan])
 def test_options_out_of_range_are_refused(most):
     with pytest.raises(ValueError, match=r"the largest tilt must be in \(0, 3\]"):
         es.Tilt(most)
+
+
+@pytest.mark.parametrize("stress", [False, True])
+def test_simd_and_portable_passes_agree(stress):
+    """Forces and energies after ten steps of a rough start, with M9 by forces alone and with its stress."""
+    x = cloud(2, 0.1)
+    v = 0.1 * np.random.default_rng(6).normal(size=x.shape)
+    found = []
+    for simd in (True, False):
+        execution.set_simd(simd)
+        material = es.NeoHookean(density=1.0, young=1.0, poisson=0.3)
+        body = es.Body(x=x, volume=1.0, spacing=1.0, material=material, velocity=v)
+        made = es.Simulation(body, scheme=es.Verlet(dissipation=es.Upwind(stress=stress)), sort=False)
+        made.step(10)
+        found.append((made.v, made.F, made.energy()["dissipation"]))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14)

@@ -29,8 +29,8 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
     """
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
-    absent = {"Forces.correction", "Forces.external"} | ({"Flux.Pi"} if vectors else set())
-    moved = {"Reference.resolution", "Reference.moment", "Flux.tie", "Flux.drag", "Forces.tie"}
+    absent = {"Forces.correction", "Forces.external", "Flux.drag"} | ({"Flux.Pi"} if vectors else set())
+    moved = {"Reference.resolution", "Reference.moment", "Flux.tie", "Forces.tie"}
     absent |= moved if moving else {"Reference.F", "Reference.balanced"}
     present = [
         field for group, fields in GROUPS.items() for name, field in fields.items() if f"{group}.{name}" not in absent
@@ -40,7 +40,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
     if vectors:
         reals += LANES * (3 + 2 * d)
     if not moving:
-        reals += LANES * d if vectors else d * d  # of Π, or ∇v F⁻¹
+        reals += LANES * d if vectors else 0  # of Π
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1

@@ -18,13 +18,13 @@ from .tie import Tie
 
 
 def _vectors(space: Space) -> int:
-    """Rows of four: X with the impedance, u, v with the shear impedance, columns of −½(F − I) and of −½∇v F⁻¹."""
+    """Rows of four: X with the impedance, u, v with the shear impedance, columns of −½(F − I) and of −½∇v (F⁻¹)."""
     return 3 + 2 * space.dim
 
 
 @functools.cache
-def _make_pack(space: Space) -> Any:
-    """Kernel: what the SIMD pass reads of a neighbour, side by side."""
+def _make_pack(space: Space, stressed: bool) -> Any:
+    """Kernel: what the SIMD pass reads of a neighbour, side by side; ∇v F⁻¹ where M9 has a stress, else ∇v."""
     real, vec, mat, dim, invert = space.real, space.vec, space.mat, space.dim, inverse(space)
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     first_H, first_grad = 12, 12 + 4 * dim
@@ -41,7 +41,9 @@ def _make_pack(space: Space) -> Any:
         rows: wp.array2d(dtype=real),
     ):
         a = first + wp.tid()
-        X_a, v_a, grad_a = reference.x[a], v[a], grad_v[a] @ invert(F[a])
+        X_a, v_a, grad_a = reference.x[a], v[a], mat(grad_v[a])
+        if wp.static(stressed):
+            grad_a = grad_a @ invert(F[a])
         u_a, H_a = x[a] - X_a, F[a] - wp.identity(n=wp.static(dim), dtype=real)
         rows[a, 3] = flux.impedance[a]
         rows[a, 7] = real(0.0)
@@ -66,6 +68,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
+    between = "now" if stressed else "xi"  # what ∇v is of
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
@@ -99,7 +102,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
                 apart[i] += (H_a[j] + both(B[3 + j], C[3 + j])) * spread(xi[i], j);
-                jump[i] += (grad_a[j] + both(B[3 + dim + j], C[3 + dim + j])) * spread(now[i], j);
+                jump[i] += (grad_a[j] + both(B[3 + dim + j], C[3 + dim + j])) * spread({between}[i], j);
             }}
         }}
         turn(xi, X);
@@ -122,10 +125,8 @@ def _make_simd(space: Space, stressed: bool) -> Any:
             tie[i] += pull;
             drag[i] += push;
             #pragma unroll
-            for (int j = 0; j < dim; ++j) {{
-                tied[i * dim + j] += pull * X[j];
-                dragged[i * dim + j] += push * N[j];
-            }}
+            for (int j = 0; j < dim; ++j) tied[i * dim + j] += pull * X[j];
+            if ({int(stressed)}) for (int j = 0; j < dim; ++j) dragged[i * dim + j] += push * N[j];
         }}
     }};
     {BY_EIGHT_LARGER}
@@ -134,10 +135,9 @@ def _make_simd(space: Space, stressed: bool) -> Any:
         ties.data[a].c[i] = total(tie[i]) * V_a;
         drags.data[a].c[i] = total(drag[i]) * V_a;
         #pragma unroll
-        for (int j = 0; j < dim; ++j) {{
-            tie_stress.data[a].data[i][j] = total(tied[i * dim + j]) * T(-0.5);
-            drag_stress.data[a].data[i][j] = total(dragged[i * dim + j]) * T(-0.5);
-        }}
+        for (int j = 0; j < dim; ++j) tie_stress.data[a].data[i][j] = total(tied[i * dim + j]) * T(-0.5);
+        if ({int(stressed)})
+            for (int j = 0; j < dim; ++j) drag_stress.data[a].data[i][j] = total(dragged[i * dim + j]) * T(-0.5);
     }}
     """
 
@@ -177,11 +177,10 @@ def _make_simd(space: Space, stressed: bool) -> Any:
         index, w, own, box = near.index, near.w, near.own, near.box
         tie, drag = forces.tie, forces.dissipation
         sum_pairs(a, begin, end, index, w, own, box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag)
-        drag_stress = mat()
+        flux.Q[a] = flux.Q[a] + flux.tie[a]
         if wp.static(stressed):
-            drag_stress = flux.drag[a] @ wp.transpose(invert(F[a]))
-        flux.drag[a] = drag_stress
-        flux.Q[a] = flux.Q[a] + flux.tie[a] + drag_stress
+            flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
+            flux.Q[a] = flux.Q[a] + flux.drag[a]
 
     return pair_potentials_simd
 
@@ -201,7 +200,9 @@ def _make_spatial(space: Space) -> Any:
 
 @functools.cache
 def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dual: bool) -> Any:
-    """Kernel of the pass; M9 where ``damped``, of D = ∇v F⁻¹, reconstructed only where v is smooth if ``sensed``.
+    """Kernel of the pass; M9 where ``damped``, reconstructed only where v is smooth if ``sensed``.
+
+    D is ∇v F⁻¹ where M9 has a stress (``stressed``), else ∇v in the reference.
 
     Π is kept with ``dual``.
     """
@@ -239,14 +240,18 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
             tied += wp.outer(pull, xi)
             if wp.static(damped):
                 plain = v[b] - v[a]
-                jump = (plain - (D[a] + D[b]) @ (now * real(0.5))) * epsilon
+                apart = xi
+                if wp.static(stressed):
+                    apart = now
+                jump = (plain - (D[a] + D[b]) @ (apart * real(0.5))) * epsilon
                 if wp.static(sensed):
                     jump = mix(jump, plain, real(1.0), sensor[a], sensor[b])
                 Z = flux.impedance[a] + flux.impedance[b]
                 Z_shear = flux.shear_impedance[a] + flux.shear_impedance[b]
                 push = pair_force(xi, now, w, Z, Z_shear, jump)
                 drag += push
-                dragged += wp.outer(push, now)
+                if wp.static(stressed):
+                    dragged += wp.outer(push, now)
         forces.tie[a] = tie * reference.V[a]
         flux.tie[a] = tied * real(-0.5)
         flux.Q[a] = flux.Q[a] + flux.tie[a]
@@ -264,8 +269,9 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
 class PairPotentials:
     """The pass at work on a medium whose arrangement does not move: a stress beside every force.
 
-    Forces and stresses are derivatives of a potential of positions and F (M16), and of one of velocities and ∇v F⁻¹
-    with the pairs as they are now (M9). So energy and both momenta find all of them, and neither knows of a rotation.
+    Forces and stresses are derivatives of a potential of positions and F (M16), and where M9 has a stress of one of
+    velocities and ∇v F⁻¹ with the pairs as they are now. So energy and both momenta find all of them, and neither
+    potential knows of a rotation.
 
     Args:
         tie: None ties nothing.
@@ -294,9 +300,9 @@ class PairPotentials:
         softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
         self._bodies = list(zip(flux.bodies, softest, strict=True))
         self._rows = packed_rows(space, n if self._simd else 0, _vectors(space), device)
-        self._D = wp.zeros(n if damped and not self._simd else 0, dtype=space.mat, device=device)
+        self._D = wp.zeros(n if self._stressed and not self._simd else 0, dtype=space.mat, device=device)
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
-        if damped:
+        if self._stressed:
             flux.fields.drag = wp.zeros(n, dtype=space.mat, device=device)
 
     def compute(
@@ -313,14 +319,16 @@ class PairPotentials:
         reference, near, flux = configuration.fields, configuration.near, self.flux.fields
         if self._simd:
             arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
-            self._launch(_make_pack(self.space), len(v), arguments)
+            self._launch(_make_pack(self.space, self._stressed), len(v), arguments)
             for body, modulus in self._bodies:
                 arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
                 self._launch(_make_simd(self.space, self._stressed), len(body), arguments, body.start)
             return
-        if self._damped:
-            self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
+        D = grad_v
+        if self._stressed:
+            D = self._D
+            self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, D])
         kernel = _make_portable(self.space, self._damped, self._stressed, sensor is not None, len(flux.Pi) > 0)
         for body, modulus in self._bodies:
-            arguments = [reference, near, state.x, state.F, v, self._D, v if sensor is None else sensor]
+            arguments = [reference, near, state.x, state.F, v, D, v if sensor is None else sensor]
             self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)
