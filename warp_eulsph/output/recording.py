@@ -1,7 +1,7 @@
 """What a run keeps, as options."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,7 +54,8 @@ class Recording:
         if isinstance(self.fields, str):
             raise ValueError(f"fields must be a list of names, got {self.fields!r}; write [{self.fields!r}]")
         if self.fields is not None:
-            object.__setattr__(self, "fields", tuple(objects(self.fields, str, "fields", '"v", "J"')))
+            named = list(self.fields) if isinstance(self.fields, Mapping) else self.fields
+            object.__setattr__(self, "fields", tuple(objects(named, str, "fields", '"v", "J"')))
         object.__setattr__(self, "dtype", np.dtype(checked_precision(self.dtype)).name)
         object.__setattr__(self, "probes", tuple(objects(self.probes, Probe, "probes", "BodyProbe(name='whole')")))
         names = [probe.name for probe in self.probes]
