@@ -57,14 +57,14 @@ class Law(NamedTuple):
 
     A law with a history has the long form, in which l = Ḟ F⁻¹ [1/s] is the velocity gradient and h the row:
 
-        stress: (F, l, h, Δt, constants) -> P, where F is Δt [s] ahead of h: that of the half step. An inelastic law
-            returns to its yield surface here too, and the new history is forgotten. Δt = 0: F and h belong together.
-        energy: (F, h, constants) -> Ψ. wave_moduli: (F, h, constants) -> (M, μ).
-        update: (F, l, h, Δt, constants) -> (F, h, energy dissipated per initial volume [J/m^d]) after each full step,
-            Δt > 0. Where it finds no state, it returns a history that is not finite; the run stops there. Between two
-            refreshes F − F_k is the motion since, so only a law that needs ``Always()`` may write F here.
-        rebase: (F, h, constants) -> (F, h) at each refresh, of bodies that it reads anew: a plastic solid starts from
-            its elastic F. It must keep det F, stress and energy. None keeps all.
+    - stress: (F, l, h, Δt, constants) -> P, where F is Δt [s] ahead of h: that of the half step. An inelastic law
+      returns to its yield surface here too, and the new history is forgotten. Δt = 0: F and h belong together.
+    - energy: (F, h, constants) -> Ψ. wave_moduli: (F, h, constants) -> (M, μ).
+    - update: (F, l, h, Δt, constants) -> (F, h, energy dissipated per initial volume [J/m^d]) after each full step,
+      Δt > 0. Where it finds no state, it returns a history that is not finite; the run stops there. Between two
+      refreshes F − F_k is the motion since, so only a law that needs ``Always()`` may write F here.
+    - rebase: (F, h, constants) -> (F, h) at each refresh, of bodies that it reads anew: a plastic solid starts from
+      its elastic F. It must keep det F, stress and energy. None keeps all.
 
     The moduli are second derivatives of Ψ along F → (I + ε m⊗n) F, n the direction of the wave and m its
     polarisation: ρ0 c² m = Q(n) m with m·Q m = d²Ψ/dε² at ε = 0.
