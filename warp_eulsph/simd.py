@@ -80,6 +80,7 @@ def prelude(space: Space) -> str:
         }}
         """
     nearest = "d - image_box * __builtin_elementwise_rint(d * image_rate)" if space.periodic else "d"
+    along = "d - image_box[j] * __builtin_elementwise_rint(d * image_rate[j])" if space.periodic else "d"
     return f"""
     #pragma clang fp contract(fast)
     typedef {"double" if wide else "float"} T;
@@ -107,88 +108,80 @@ def prelude(space: Space) -> str:
         return out;
     }};
     auto nearest = [&](V d) __attribute__((always_inline)) {{ return {nearest}; }};
+    // the same of differences of coordinate j alone
+    auto nearest_along = [&](V d, int j) __attribute__((always_inline)) {{ return {along}; }};
     """
 
 
-#: C++ that calls ``eight(indices, weights)`` for the neighbours of ``a``, eight at a time; where fewer are left, ``a``
-#: itself with weight zero makes up the number. Expects begin, end, index and w among the arguments.
-BY_EIGHT = """
-    int k = begin;
-    for (; k + 8 <= end; k += 8) {
-        V eight_w;
+#: The row of particle ``a`` itself, in both halves of a vector, its last lane times ``sign``: what is added there where
+#: the rest is subtracted has the other sign. Expects ``all``, the packed rows, and ``vectors``, how many each has.
+OWN_ROW = """
+    const auto mine = [&](int m, T sign) {
+        Q q = all[(size_t)a * vectors + m];
+        q[3] *= sign;
+        return both(q, q);
+    };
+"""
+
+_PLAIN = """
+    auto eight_weights = [&](int k) { V v; __builtin_memcpy(&v, w.data + k, sizeof(V)); return v; };
+    auto one_weight = [&](int k) { return w.data[k]; };
+"""
+
+
+def _tilted(weight: str) -> str:
+    """C++ of the weights of a pair from ``w`` and ``own``, for numbers and vectors alike."""
+    return f"""
+    auto combined = [](auto w, auto own) __attribute__((always_inline)) {{ return {weight}; }};
+    auto eight_weights = [&](int k) __attribute__((always_inline)) {{
+        V eight_w, eight_own;
         __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
-        eight(index.data + k, eight_w);
-    }
+        __builtin_memcpy(&eight_own, own.data + k, sizeof(V));
+        return combined(eight_w, eight_own);
+    }};
+    auto one_weight = [&](int k) {{ return combined(w.data[k], own.data[k]); }};
+    """
+
+
+_EIGHT = """
+    int k = begin;
+    for (; k + 8 <= end; k += 8) eight(index.data + k, eight_weights(k));
     if (k < end) {
         int some[8];
         V some_w = 0;
         #pragma unroll
         for (int i = 0; i < 8; ++i) {
             some[i] = k + i < end ? index.data[k + i] : a;
-            if (k + i < end) some_w[i] = w.data[k + i];
+            if (k + i < end) some_w[i] = one_weight(k + i);
         }
         eight(some, some_w);
     }
 """
 
-#: The same with the larger of the tilted weights (M17) of both ends, w + |w − own|; expects ``own`` too.
-BY_EIGHT_LARGER = """
+_TWO = """
     int k = begin;
     for (; k + 8 <= end; k += 8) {
-        V eight_w, eight_own;
-        __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
-        __builtin_memcpy(&eight_own, own.data + k, sizeof(V));
-        eight_w += __builtin_elementwise_abs(eight_w - eight_own);
-        eight(index.data + k, eight_w);
-    }
-    if (k < end) {
-        int some[8];
-        V some_w = 0;
+        const V eight_w = eight_weights(k);
+        const int* const b = index.data + k;
         #pragma unroll
-        for (int i = 0; i < 8; ++i) {
-            some[i] = k + i < end ? index.data[k + i] : a;
-            if (k + i < end) {
-                const T less = w.data[k + i] - own.data[k + i];
-                some_w[i] = w.data[k + i] + (less > 0 ? less : -less);
-            }
-        }
-        eight(some, some_w);
+        for (int i = 0; i < 4; ++i) two(b[i], b[i + 4], spread(eight_w, i), i);
+    }
+    for (; k < end; k += 2) {
+        const bool last = k + 1 == end;
+        two(index.data[k], last ? a : index.data[k + 1], both((Q)one_weight(k), last ? (Q)0 : (Q)one_weight(k + 1)), 0);
     }
 """
+
+#: C++ that calls ``eight(indices, weights)`` for the neighbours of ``a``, eight at a time; where fewer are left, ``a``
+#: itself with weight zero makes up the number. Expects begin, end, index and w among the arguments.
+BY_EIGHT = _PLAIN + _EIGHT
+
+#: The same with the larger of the tilted weights (M17) of both ends; expects ``own`` too.
+BY_EIGHT_LARGER = _tilted("w + __builtin_elementwise_abs(w - own)") + _EIGHT
 
 #: C++ that calls ``two(b, c, weights)`` for the neighbours of ``a``, two at a time; of an odd number the last one comes
 #: with ``a`` itself at weight zero. Expects begin, end, index and w among the arguments.
-BY_TWO = """
-    int k = begin;
-    for (; k + 8 <= end; k += 8) {
-        V eight_w;
-        __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
-        const int* const b = index.data + k;
-        #pragma unroll
-        for (int i = 0; i < 4; ++i) two(b[i], b[i + 4], spread(eight_w, i), i);
-    }
-    for (; k < end; k += 2) {
-        const bool last = k + 1 == end;
-        two(index.data[k], last ? a : index.data[k + 1], both((Q)w.data[k], last ? (Q)0 : (Q)w.data[k + 1]), 0);
-    }
-"""
+BY_TWO = _PLAIN + _TWO
 
-#: The same for tilted weights (M17) of the other ends, 2 w − own; expects ``own`` too.
-BY_TWO_DUAL = """
-    int k = begin;
-    for (; k + 8 <= end; k += 8) {
-        V eight_w, eight_own;
-        __builtin_memcpy(&eight_w, w.data + k, sizeof(V));
-        __builtin_memcpy(&eight_own, own.data + k, sizeof(V));
-        eight_w += eight_w - eight_own;
-        const int* const b = index.data + k;
-        #pragma unroll
-        for (int i = 0; i < 4; ++i) two(b[i], b[i + 4], spread(eight_w, i), i);
-    }
-    for (; k < end; k += 2) {
-        const bool last = k + 1 == end;
-        const int next = last ? k : k + 1;
-        const T one = w.data[k] + (w.data[k] - own.data[k]), other = w.data[next] + (w.data[next] - own.data[next]);
-        two(index.data[k], last ? a : index.data[next], both((Q)one, last ? (Q)0 : (Q)other), 0);
-    }
-"""
+#: The same with the tilted weights (M17) of the other ends; expects ``own`` too.
+BY_TWO_DUAL = _tilted("w + (w - own)") + _TWO

@@ -36,20 +36,9 @@ def _make_forces(space: Space, tilted: bool) -> Any:
     """Kernel: M5 from packed rows; with tilted weights their Σ own ξ is known (M17), without it is summed here."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    separation = "spread(P, 3) - x_a[j]"
-    if space.periodic:
-        separation = f"nearest_along({separation}, j)"
     snippet = f"""
     {prelude(space)}
     const Q* const all = (const Q*)rows.data;
-    {
-        ""
-        if not space.periodic
-        else '''
-    auto nearest_along = [&](V d, int j) __attribute__((always_inline)) {
-        return d - image_box[j] * __builtin_elementwise_rint(d * image_rate[j]);
-    };'''
-    }
     T x_a[dim];
     V Pi_a[dim], sums[4] = {{0, 0, 0, 0}};
     #pragma unroll
@@ -63,7 +52,7 @@ def _make_forces(space: Space, tilted: bool) -> Any:
         #pragma unroll
         for (int j = 0; j < dim; ++j) {{
             const V P = both(all[(size_t)b * dim + j], all[(size_t)c * dim + j]);
-            force += {"P" if tilted else "(P + Pi_a[j])"} * ({separation});
+            force += {"P" if tilted else "(P + Pi_a[j])"} * nearest_along(spread(P, 3) - x_a[j], j);
         }}
         sums[part] += force * w;
     }};

@@ -7,9 +7,22 @@ import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
-from ..simd import BY_EIGHT, packed_rows, prelude
+from ..simd import BY_EIGHT, OWN_ROW, packed_rows, prelude
 from ..space import Space
 from .reference import Configuration
+
+#: C++ of what an upwind flux (M9) asks of eight pairs: |ξ|² of X, |n|² of N, the pairs as they are now (1 where there
+#: is no direction), and N · J with the velocity jumps J.
+SQUARES = """
+        V rr = X[0] * X[0], nn = N[0] * N[0], along = N[0] * J[0];
+        #pragma unroll
+        for (int j = 1; j < dim; ++j) {
+            rr += X[j] * X[j];
+            nn += N[j] * N[j];
+            along += N[j] * J[j];
+        }
+        nn = nn > 0 ? nn : (V)1;
+"""
 
 
 def _vectors(space: Space) -> int:
@@ -56,26 +69,18 @@ def _make_forces(space: Space) -> Any:
     """Kernel: M5 and M9 from packed rows."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    # the difference of one coordinate of balanced positions, nearest image in a periodic box
-    balanced = "spread(P, 3)"
-    if space.periodic:
-        balanced = "spread(P, 3) - image_box[j] * __builtin_elementwise_rint(spread(P, 3) * image_rate[j])"
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
     const Q* const all = (const Q*)rows.data;
-    const auto own = [&](int m, T sign) {{
-        Q q = all[(size_t)a * vectors + m];
-        q[3] *= sign;
-        return both(q, q);
-    }};
+    {OWN_ROW}
     // impedances are added where the rest is subtracted
-    const V x_a = own(0, -1), v_a = own(1, -1), now_a = own(2, 1);
+    const V x_a = mine(0, -1), v_a = mine(1, -1), now_a = mine(2, 1);
     V grad_a[dim], Pi_a[dim], internal = 0, dissipation[dim];
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
-        grad_a[j] = own(3 + j, 1);
-        Pi_a[j] = own(3 + dim + j, -1);
+        grad_a[j] = mine(3 + j, 1);
+        Pi_a[j] = mine(3 + dim + j, -1);
         dissipation[j] = 0;
     }}
     auto eight = [&](const int* b, V w) __attribute__((always_inline)) {{
@@ -93,14 +98,7 @@ def _make_forces(space: Space) -> Any:
         turn(xi, X);
         turn(now, N);
         turn(jump, J);
-        V rr = X[0] * X[0], nn = N[0] * N[0], along = N[0] * J[0];
-        #pragma unroll
-        for (int j = 1; j < dim; ++j) {{
-            rr += X[j] * X[j];
-            nn += N[j] * N[j];
-            along += N[j] * J[j];
-        }}
-        nn = nn > 0 ? nn : (V)1;
+        {SQUARES}
         const V wr = w * __builtin_elementwise_sqrt(rr), Z = X[3], Z_shear = J[3];
         const V normal = along * (Z - Z_shear) * (wr / nn), shear = Z_shear * wr;
         #pragma unroll
@@ -114,7 +112,7 @@ def _make_forces(space: Space) -> Any:
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
                 const V P = Pi_a[j] + both(B[3 + dim + j], C[3 + dim + j]);
-                force += P * ({balanced});
+                force += P * nearest_along(spread(P, 3), j);
             }}
             internal += force * spread(w, i);
         }}

@@ -9,10 +9,11 @@ import warp as wp
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..linalg import inverse
-from ..simd import BY_EIGHT_LARGER, packed_rows, prelude
+from ..simd import BY_EIGHT_LARGER, OWN_ROW, packed_rows, prelude
 from ..space import Space, difference
 from .dissipation import Upwind, blend, upwind
 from .flux import Flux
+from .pair_forces import SQUARES
 from .reference import Configuration
 from .tie import Tie
 
@@ -73,11 +74,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
     const Q* const all = (const Q*)rows.data;
-    const auto mine = [&](int m, T sign) {{
-        Q q = all[(size_t)a * vectors + m];
-        q[3] *= sign;
-        return both(q, q);
-    }};
+    {OWN_ROW}
     // impedances are added where the rest is subtracted
     const V X_a = mine(0, -1), u_a = mine(1, 1), v_a = mine(2, -1);
     V H_a[dim], grad_a[dim], tie[dim], drag[dim], tied[dim * dim], dragged[dim * dim];
@@ -109,14 +106,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
         turn(now, N);
         turn(jump, J);
         turn(apart, R);
-        V rr = X[0] * X[0], nn = N[0] * N[0], along = N[0] * J[0];
-        #pragma unroll
-        for (int j = 1; j < dim; ++j) {{
-            rr += X[j] * X[j];
-            nn += N[j] * N[j];
-            along += N[j] * J[j];
-        }}
-        nn = nn > 0 ? nn : (V)1;
+        {SQUARES}
         const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon), stiffness = w * modulus;
         const V Z = X[3], Z_shear = J[3], normal = along * (Z - Z_shear) * (area / nn), shear = Z_shear * area;
         #pragma unroll

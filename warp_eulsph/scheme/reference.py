@@ -140,19 +140,6 @@ def _make_defect(space: Space) -> Any:
     return defect
 
 
-@functools.cache
-def _make_opposite(space: Space) -> Any:
-    """Kernel: a ← −a."""
-    vec = space.vec
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def opposite(first: int, out: wp.array(dtype=vec)):
-        a = first + wp.tid()
-        out[a] = -out[a]
-
-    return opposite
-
-
 class Configuration:
     """The configuration in which weights live: positions, volumes, corrections, neighbour lists.
 
@@ -249,7 +236,7 @@ class Configuration:
             tilt = wp.zeros(n, dtype=space.vec, device=self.device)
             # By L and w without tilt: the step, and which way out is
             self._launch(_make_resolve(space), n, [self.particles, self.fields])
-            self._look_outward()
+            self._look_outward(tilt)  # zero still
             arguments = [self.particles, self.fields, self.near, self.poor, self.tilt.most, tilt]
             self._launch(make_tilt(space), n, arguments)
             self._launch(make_tilted_sums(space), n, [self.fields, self.near, tilt])
@@ -298,11 +285,11 @@ class Configuration:
         self.divergence(self.fields.L, out)
         self._launch(_make_defect(self.space), len(out), [surface, out])
 
-    def _look_outward(self) -> None:
-        """``particles.outward`` from the weights as they are."""
+    def _look_outward(self, nothing: wp.array) -> None:
+        """``particles.outward`` from the weights as they are, less ``nothing``."""
         out = self.particles.outward
         self._launch(make_divergence(self.space, self.simd), len(out), [self.fields, self.near, self.fields.L, out])
-        self._launch(_make_opposite(self.space), len(out), [out])
+        self._launch(_make_defect(self.space), len(out), [nothing, out])
 
     def nearest(self) -> np.ndarray:
         """Distance of each particle to its nearest neighbour [m], (n,), inf without one; reads the device."""
