@@ -192,10 +192,11 @@ def test_options_out_of_range_are_refused(most):
         es.Tilt(most)
 
 
+@pytest.mark.parametrize("dim", [1, 2, 3])
 @pytest.mark.parametrize("stress", [False, True])
-def test_simd_and_portable_passes_agree(stress):
+def test_simd_and_portable_passes_agree(stress, dim):
     """Forces and energies after ten steps of a rough start, with M9 by forces alone and with its stress."""
-    x = cloud(2, 0.1)
+    x = cloud(dim, 0.1)
     v = 0.1 * np.random.default_rng(6).normal(size=x.shape)
     found = []
     for simd in (True, False):
@@ -207,3 +208,25 @@ def test_simd_and_portable_passes_agree(stress):
         found.append((made.v, made.F, made.energy()["dissipation"]))
     for one, other in zip(*found, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("stress", [False, True])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_rotation_is_not_dragged_whatever_positions_say(dim, stress):
+    """v = Ω x with positions a tenth of a spacing off F: no force of M9, of which Ω × r would be a jump."""
+    x = cloud(dim, 0.1)
+    turn = np.zeros((dim, dim))
+    turn[1, 0], turn[0, 1] = 1.0, -1.0
+    off = x + 0.03 * np.random.default_rng(7).uniform(-1.0, 1.0, x.shape)
+    scheme = es.Verlet(dissipation=es.Upwind(stress=stress))
+    body = es.Body(x=x, volume=1.0, spacing=1.0, material=STEEL, velocity=off @ turn.T)
+    made = es.Simulation(body, scheme=scheme, sort=False)
+    stepper = made.stepper
+    stepper.U.x.assign(off)
+    stepper.grad_v.assign(np.broadcast_to(turn, (len(x), dim, dim)))
+    stepper._choose_dt(stepper.U)  # impedances
+    stepper._stress(stepper.U, 0.0)
+    stepper._sum_forces(stepper.U, stepper.U, 0.0)
+    assert stepper.medium.flux.fields.impedance.numpy().min() > 0.1
+    assert np.abs(stepper.forces.tie.numpy()).max() > 1e-3
+    assert np.abs(stepper.forces.dissipation.numpy()).max() < 1e-13

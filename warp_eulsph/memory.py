@@ -40,7 +40,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
     if vectors:
         reals += LANES * (3 + 2 * d)
     if not moving:
-        reals += LANES * d if vectors else 0  # of Π
+        reals += LANES * (d + 1) if vectors else d * d  # Π, spin; ∇v F⁻¹
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1

@@ -16,19 +16,20 @@ from .flux import Flux
 from .pair_forces import SQUARES
 from .reference import Configuration
 from .tie import Tie
+from .turning import TURNING, make_spin, make_turned
 
 
 def _vectors(space: Space) -> int:
-    """Rows of four: X with the impedance, u, v with the shear impedance, columns of −½(F − I) and of −½∇v (F⁻¹)."""
-    return 3 + 2 * space.dim
+    """Rows of four: X and impedance, u, v and shear impedance, columns of −½(F − I) and −½∇v (F⁻¹), −½ spin."""
+    return 4 + 2 * space.dim
 
 
 @functools.cache
 def _make_pack(space: Space, stressed: bool) -> Any:
     """Kernel: what the SIMD pass reads of a neighbour, side by side; ∇v F⁻¹ where M9 has a stress, else ∇v."""
     real, vec, mat, dim, invert = space.real, space.vec, space.mat, space.dim, inverse(space)
-    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
-    first_H, first_grad = 12, 12 + 4 * dim
+    Reference, Flux, spin_of = structure(space, "Reference"), structure(space, "Flux"), make_spin(space)
+    first_H, first_grad, first_spin = 12, 12 + 4 * dim, 12 + 8 * dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def pack(
@@ -43,8 +44,13 @@ def _make_pack(space: Space, stressed: bool) -> Any:
     ):
         a = first + wp.tid()
         X_a, v_a, grad_a = reference.x[a], v[a], mat(grad_v[a])
+        spatial = grad_a @ invert(F[a])
         if wp.static(stressed):
-            grad_a = grad_a @ invert(F[a])
+            grad_a = spatial
+        omega = spin_of(spatial)
+        for i in range(3):
+            rows[a, first_spin + i] = omega[i] * real(-0.5)
+        rows[a, first_spin + 3] = real(0.0)
         u_a, H_a = x[a] - X_a, F[a] - wp.identity(n=wp.static(dim), dtype=real)
         rows[a, 3] = flux.impedance[a]
         rows[a, 7] = real(0.0)
@@ -70,6 +76,8 @@ def _make_simd(space: Space, stressed: bool) -> Any:
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
     between = "now" if stressed else "xi"  # what ∇v is of
+    # what positions are off turns with the pair: no drag on rotation
+    turning = "" if stressed or space.dim == 1 else TURNING[space.dim]
     snippet = f"""
     {prelude(space)}
     constexpr int vectors = {_vectors(space)};
@@ -77,6 +85,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
     {OWN_ROW}
     // impedances are added where the rest is subtracted
     const V X_a = mine(0, -1), u_a = mine(1, 1), v_a = mine(2, -1);
+    const V spin_a = mine(3 + 2 * dim, 1);
     V H_a[dim], grad_a[dim], tie[dim], drag[dim], tied[dim * dim], dragged[dim * dim];
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
@@ -87,7 +96,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
     #pragma unroll
     for (int j = 0; j < dim * dim; ++j) tied[j] = dragged[j] = 0;
     auto eight = [&](const int* b, V w) __attribute__((always_inline)) {{
-        V xi[4], apart[4], jump[4], now[4], X[4], R[4], J[4], N[4];
+        V xi[4], apart[4], jump[4], now[4], spin[4], X[4], R[4], J[4], N[4], S[4];
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
             const Q* const B = all + (size_t)b[i] * vectors;
@@ -96,6 +105,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
             apart[i] = both(B[1], C[1]) - u_a;
             now[i] = xi[i] + apart[i];
             jump[i] = both(B[2], C[2]) - v_a;
+            spin[i] = both(B[3 + 2 * dim], C[3 + 2 * dim]) + spin_a;
             #pragma unroll
             for (int j = 0; j < dim; ++j) {{
                 apart[i] += (H_a[j] + both(B[3 + j], C[3 + j])) * spread(xi[i], j);
@@ -106,6 +116,8 @@ def _make_simd(space: Space, stressed: bool) -> Any:
         turn(now, N);
         turn(jump, J);
         turn(apart, R);
+        turn(spin, S);
+        {turning}
         {SQUARES}
         const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon), stiffness = w * modulus;
         const V Z = X[3], Z_shear = J[3], normal = along * (Z - Z_shear) * (area / nn), shear = Z_shear * area;
@@ -192,7 +204,8 @@ def _make_spatial(space: Space) -> Any:
 def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dual: bool) -> Any:
     """Kernel of the pass; M9 where ``damped``, reconstructed only where v is smooth if ``sensed``.
 
-    D is ∇v F⁻¹ where M9 has a stress (``stressed``), else ∇v in the reference.
+    With a stress (``stressed``) the jump is reconstructed by D = ∇v F⁻¹ between the pair as it is now; without by ∇v in
+    the reference, and by the spin of D for what positions are off. Either way a rotation is not dragged.
 
     Π is kept with ``dual``.
     """
@@ -200,6 +213,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
     separation, pair_force, mix, invert = difference(space), upwind(space), blend(space), inverse(space)
+    spin_of, turned = make_spin(space), make_turned(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def pair_potentials(
@@ -209,6 +223,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
         x: wp.array(dtype=vec),
         F: wp.array(dtype=mat),
         v: wp.array(dtype=vec),
+        grad_v: wp.array(dtype=mat),
         D: wp.array(dtype=mat),
         sensor: wp.array(dtype=vec),
         modulus: real,
@@ -225,15 +240,19 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
             # by displacements: in a periodic box the nearest image of a strained pair may be another
             now = xi + ((x[b] - reference.x[b]) - (x[a] - reference.x[a]))
             w = near.w[k] + wp.abs(near.w[k] - near.own[k])
-            pull = (now - (F[a] + F[b]) @ (xi * real(0.5))) * (modulus * w)
+            off = now - (F[a] + F[b]) @ (xi * real(0.5))
+            pull = off * (modulus * w)
             tie += pull
             tied += wp.outer(pull, xi)
             if wp.static(damped):
                 plain = v[b] - v[a]
-                apart = xi
+                jump = plain
                 if wp.static(stressed):
-                    apart = now
-                jump = (plain - (D[a] + D[b]) @ (apart * real(0.5))) * epsilon
+                    jump -= (D[a] + D[b]) @ (now * real(0.5))
+                else:
+                    jump -= (grad_v[a] + grad_v[b]) @ (xi * real(0.5))
+                    jump -= turned(spin_of(D[a] + D[b]) * real(0.5), off, wp.length(xi) * real(0.5))
+                jump = jump * epsilon
                 if wp.static(sensed):
                     jump = mix(jump, plain, real(1.0), sensor[a], sensor[b])
                 Z = flux.impedance[a] + flux.impedance[b]
@@ -290,7 +309,7 @@ class PairPotentials:
         softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
         self._bodies = list(zip(flux.bodies, softest, strict=True))
         self._rows = packed_rows(space, n if self._simd else 0, _vectors(space), device)
-        self._D = wp.zeros(n if self._stressed and not self._simd else 0, dtype=space.mat, device=device)
+        self._D = wp.zeros(n if damped and not self._simd else 0, dtype=space.mat, device=device)
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
         if self._stressed:
             flux.fields.drag = wp.zeros(n, dtype=space.mat, device=device)
@@ -314,11 +333,9 @@ class PairPotentials:
                 arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
                 self._launch(_make_simd(self.space, self._stressed), len(body), arguments, body.start)
             return
-        D = grad_v
-        if self._stressed:
-            D = self._D
-            self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, D])
+        if self._damped:
+            self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
         kernel = _make_portable(self.space, self._damped, self._stressed, sensor is not None, len(flux.Pi) > 0)
         for body, modulus in self._bodies:
-            arguments = [reference, near, state.x, state.F, v, D, v if sensor is None else sensor]
+            arguments = [reference, near, state.x, state.F, v, grad_v, self._D, v if sensor is None else sensor]
             self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)
