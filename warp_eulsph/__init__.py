@@ -55,6 +55,7 @@ from .scheme.limiter import FluxCorrectedTransport
 from .scheme.pair_areas import PairAreas
 from .scheme.policy import Always, Every, Never, ReferencePolicy, WhenDistorted
 from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
+from .scheme.sharpening import Sharpening
 from .scheme.shifting import Shifting
 from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.stabiliser import Correction
@@ -117,6 +118,7 @@ __all__ = [
     "Scheme",
     "Sensor",
     "Shepard",
+    "Sharpening",
     "Shifting",
     "Simulation",
     "Smoothing",

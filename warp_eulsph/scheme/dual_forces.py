@@ -10,23 +10,20 @@ from ..fields import neighbour_structure, structure
 from ..simd import BY_TWO_DUAL, packed_rows, prelude
 from ..space import Space
 from .reference import Configuration
+from .sharpening import Sharpener, pack_columns
 from .stabiliser import Stabiliser
 
 
 @functools.cache
 def _make_pack(space: Space) -> Any:
     """Kernel: columns of Π = Q Lᵀ (M5), made here, each with a coordinate of x, side by side."""
-    real, dim = space.real, space.dim
+    real, pack_matrix = space.real, pack_columns(space)
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
 
     @wp.kernel(module="unique", enable_backward=False)
     def pack(first: int, reference: Reference, flux: Flux, rows: wp.array2d(dtype=real)):
         a = first + wp.tid()
-        x_a, Pi_a = reference.x[a], flux.Q[a] @ wp.transpose(reference.L[a])
-        for j in range(wp.static(dim)):
-            rows[a, 4 * j + 3] = x_a[j]
-            for i in range(wp.static(dim)):
-                rows[a, 4 * j + i] = Pi_a[i, j]
+        pack_matrix(a, flux.Q[a] @ wp.transpose(reference.L[a]), reference.x[a], rows)
 
     return pack
 
@@ -91,12 +88,12 @@ def _make_forces(space: Space, tilted: bool) -> Any:
 
 
 class DualForces(Stabiliser):
-    """M5 at work; what dissipates and ties there is in the stress already (M9, M16)."""
+    """M5 at work, sharpened or not (M21); what dissipates and ties there is in the stress already (M9, M16)."""
 
     corrects = False
 
-    def __init__(self, space: Space, n: int, device: Any):
-        self.space, self._launch = space, Launcher(device)
+    def __init__(self, space: Space, n: int, sharpener: Sharpener | None, device: Any):
+        self.space, self._sharpener, self._launch = space, sharpener, Launcher(device)
         self._rows = packed_rows(space, n, space.dim, device)
 
     def refresh(self, configuration: Configuration, state: Any) -> None:
@@ -118,10 +115,14 @@ class DualForces(Stabiliser):
         forces: Any,
     ) -> None:
         """Internal force (M5) into ``forces``."""
+        n, rows = len(forces.internal), self._rows
+        if configuration.simd or self._sharpener is not None:
+            self._launch(_make_pack(self.space), n, [configuration.fields, flux, rows])
+        if self._sharpener is not None:
+            self._sharpener.stress(flux, rows)
+            rows = self._sharpener.stress_rows
         if not configuration.simd:
             configuration.divergence(flux.Pi, forces.internal)
             return
-        n = len(forces.internal)
-        self._launch(_make_pack(self.space), n, [configuration.fields, flux, self._rows])
         kernel = _make_forces(self.space, configuration.tilt is not None)
-        self._launch(kernel, n, [configuration.fields, configuration.near, self._rows, forces.internal])
+        self._launch(kernel, n, [configuration.fields, configuration.near, rows, forces.internal])

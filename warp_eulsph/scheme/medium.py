@@ -20,6 +20,7 @@ from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
+from .sharpening import Sharpener
 from .shifting import Shifter
 from .stabiliser import Stabiliser
 from .updates import make_drift, make_kick, make_predict
@@ -72,7 +73,7 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
-        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
+        stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
         particles, forces, grad_v: of its own particles, views of what the world has.
     """
 
@@ -91,7 +92,12 @@ class Medium:
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
-        self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
+        self.sharpener: Sharpener | None = None
+        if self.configuration.sharpened:
+            self.sharpener = Sharpener(space, self.configuration, n, device)
+        self.stabiliser: Stabiliser = UpwindForces(space, device)
+        if plain:
+            self.stabiliser = DualForces(space, n, self.sharpener, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
             _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
             self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
@@ -182,8 +188,9 @@ class Medium:
     # the lines of a step
 
     def velocity_gradient(self, state: Any) -> None:
-        """∇_k v (M4)."""
-        self.configuration.gradient(self.of(state).v, self.grad_v)
+        """∇_k v (M4, M21)."""
+        gradient = self.configuration.gradient if self.sharpener is None else self.sharpener.gradient
+        gradient(self.of(state).v, self.grad_v)
 
     def gradients(self, state: Any) -> None:
         """∇_k v, and ∇_k F where the smoothing needs it (M4)."""
