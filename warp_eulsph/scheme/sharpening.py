@@ -21,8 +21,8 @@ class Sharpening:
     What the corrected gradient misses of a smooth field is of the second order, and M4 sees it itself: of the jumps
     that two particles' gradients leave between them, r_ab = f_b − f_a − ½(∇f_a + ∇f_b)ξ, it takes 3/2 of its own error,
     whatever the weights. Two thirds of the gradient of r added to ∇f leave an error of the fourth order inside, and a
-    third of the first-order error at free faces: waves disperse less, and coarse bodies are as stiff as they should be.
-    Linear fields stay exact, and by the adjoint energy and both momenta.
+    third to two thirds of the first-order error at free faces: waves disperse less, and coarse bodies are as stiff as
+    they should be. Linear fields stay exact, and by the adjoint energy and both momenta.
 
     It acts where the arrangement does not move, at the price of two more sums over neighbours per step and of a step
     shorter by a sixth.
