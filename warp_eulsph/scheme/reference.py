@@ -53,8 +53,8 @@ def _make_adopt(space: Space, fixed: bool) -> Any:
 # step: without this the punch at 40² fails.
 LOPSIDED = 4.0
 
-# How much higher the highest frequency is with sharpened gradients (M21): 1.17 to 1.21 in squares and cubes, jittered or
-# not (``tests/test_sharpening.py``).
+# How much higher the highest frequency is with sharpened gradients (M21): 1.17 to 1.21 in squares and cubes, jittered
+# or not (``tests/test_sharpening.py``).
 STEEPER = 1.2
 
 
