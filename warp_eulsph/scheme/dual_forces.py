@@ -10,22 +10,8 @@ from ..fields import neighbour_structure, structure
 from ..simd import BY_TWO_DUAL, packed_rows, prelude
 from ..space import Space
 from .reference import Configuration
-from .sharpening import Sharpener, pack_columns
+from .sharpening import Sharpener, make_pack
 from .stabiliser import Stabiliser
-
-
-@functools.cache
-def _make_pack(space: Space) -> Any:
-    """Kernel: columns of Π = Q Lᵀ (M5), made here, each with a coordinate of x, side by side."""
-    real, pack_matrix = space.real, pack_columns(space)
-    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def pack(first: int, reference: Reference, flux: Flux, rows: wp.array2d(dtype=real)):
-        a = first + wp.tid()
-        pack_matrix(a, flux.Q[a] @ wp.transpose(reference.L[a]), reference.x[a], rows)
-
-    return pack
 
 
 @functools.cache
@@ -117,9 +103,9 @@ class DualForces(Stabiliser):
         """Internal force (M5) into ``forces``."""
         n, rows = len(forces.internal), self._rows
         if configuration.simd or self._sharpener is not None:
-            self._launch(_make_pack(self.space), n, [configuration.fields, flux, rows])
+            self._launch(make_pack(self.space), n, [configuration.fields, flux.Q, rows])
         if self._sharpener is not None:
-            self._sharpener.stress(flux, rows)
+            self._sharpener.stress(flux.Q, rows, flux.Pi)
             rows = self._sharpener.stress_rows
         if not configuration.simd:
             configuration.divergence(flux.Pi, forces.internal)

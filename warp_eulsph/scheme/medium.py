@@ -142,12 +142,15 @@ class Medium:
     def find_surface(self, state: Any) -> None:
         """s_a = e_a at the start (M10)."""
         nothing_yet = self.forces.free_v
-        self.configuration.defect(nothing_yet, self.of(state).surface)
+        unit = None if self.sharpener is None else self.sharpener.unit()
+        self.configuration.defect(nothing_yet, self.of(state).surface, unit)
 
     def look_outward(self, state: Any) -> None:
-        """Which way out is: by the area vectors, unless weights are tilted."""
-        if self.configuration.tilt is None:
+        """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""
+        if self.configuration.tilt is None and self.sharpener is None:
             wp.copy(self.particles.outward, self.of(state).surface)
+        elif self.configuration.tilt is None:
+            self.configuration.defect(self.forces.free_v, self.particles.outward)
 
     def move(self, state: Any) -> None:
         """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""

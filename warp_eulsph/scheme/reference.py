@@ -283,13 +283,13 @@ class Configuration:
         kernel = make_divergence(self.space, self.simd) if self.tilt is None else make_tilted_divergence(self.space)
         self._launch(kernel, len(out), [self.fields, self.near, Pi, out])
 
-    def defect(self, surface: wp.array, out: wp.array) -> None:
+    def defect(self, surface: wp.array, out: wp.array, unit: wp.array | None = None) -> None:
         """``out`` ← e_a − s_a [m^(d−1)], (n,) of vec, for surface vectors s_a (M10).
 
-        e_a = Σ_b V_b G_a(x_b), the dual divergence (M5) of a unit stress: what a uniform stress would exert on a. To be
-        asked for before positions are balanced (M13), as long as L is symmetric.
+        e_a = Σ_b V_b G_a(x_b), the dual divergence (M5) of a unit stress, of which ``unit`` is Π, L by default: what a
+        uniform stress would exert on a. To be asked for before positions are balanced (M13), as long as L is symmetric.
         """
-        self.divergence(self.fields.L, out)
+        self.divergence(self.fields.L if unit is None else unit, out)
         self._launch(_make_defect(self.space), len(out), [surface, out])
 
     def _look_outward(self, nothing: wp.array) -> None:

@@ -4,6 +4,7 @@ import functools
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ..execution import Launcher
@@ -141,6 +142,20 @@ def pack_columns(space: Space) -> Any:
 
 
 @functools.cache
+def make_pack(space: Space) -> Any:
+    """Kernel: Π = Q Lᵀ (M5) into packed rows."""
+    real, mat, pack_matrix = space.real, space.mat, pack_columns(space)
+    Reference = structure(space, "Reference")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pack(first: int, reference: Reference, Q: wp.array(dtype=mat), rows: wp.array2d(dtype=real)):
+        a = first + wp.tid()
+        pack_matrix(a, Q[a] @ wp.transpose(reference.L[a]), reference.x[a], rows)
+
+    return pack
+
+
+@functools.cache
 def _make_gradient(space: Space, simd: bool) -> Any:
     """Kernel: ∇f (M4) into packed rows."""
     real, vec = space.real, space.vec
@@ -183,10 +198,10 @@ def _make_sharpen(space: Space, simd: bool) -> Any:
 def _make_stress(space: Space, simd: bool) -> Any:
     """Kernel: Π̃ = Q̃ Lᵀ with Q̃ = Q + ⅓ (Q − Σ_b V_b g_ba (Π_b ξ) ⊗ ξ), the adjoint of ∇̃ (M21).
 
-    Into packed rows with ``simd``, in the place of Π without.
+    Into packed rows with ``simd``, into an array without.
     """
-    real = space.real
-    Reference, Flux, Neighbours = structure(space, "Reference"), structure(space, "Flux"), neighbour_structure(space)
+    real, mat = space.real, space.mat
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     sum_of, pack = turned_sum(space, simd, dual=True), pack_columns(space)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -194,17 +209,18 @@ def _make_stress(space: Space, simd: bool) -> Any:
         first: int,
         reference: Reference,
         near: Neighbours,
-        flux: Flux,
+        Q: wp.array(dtype=mat),
         rows: wp.array2d(dtype=real),
         out: wp.array2d(dtype=real),
+        Pi: wp.array(dtype=mat),
     ):
         a = first + wp.tid()
-        sharp = flux.Q[a] + (flux.Q[a] - sum_of(a, near, rows, reference.x)) * real(SHARE)
-        Pi = sharp @ wp.transpose(reference.L[a])
+        sharp = Q[a] + (Q[a] - sum_of(a, near, rows, reference.x)) * real(SHARE)
+        Pi_a = sharp @ wp.transpose(reference.L[a])
         if wp.static(simd):
-            pack(a, Pi, reference.x[a], out)
+            pack(a, Pi_a, reference.x[a], out)
         else:
-            flux.Pi[a] = Pi
+            Pi[a] = Pi_a
 
     return sharpen_stress
 
@@ -227,7 +243,16 @@ class Sharpener:
         self._launch(_make_gradient(self.space, simd), len(f), [reference, near, f, self._rows])
         self._launch(_make_sharpen(self.space, simd), len(f), [reference, near, self._rows, out])
 
-    def stress(self, flux: Any, rows: wp.array) -> None:
-        """Π̃ from Q of ``flux`` and Π = Q Lᵀ in packed ``rows``: into ``stress_rows``, or Π of ``flux`` without SIMD."""
-        arguments = [self.configuration.fields, self.configuration.near, flux, rows, self.stress_rows]
+    def stress(self, Q: wp.array, rows: wp.array, Pi: wp.array) -> None:
+        """Π̃ from Q, and Π = Q Lᵀ in packed ``rows``: into ``stress_rows``, or into ``Pi`` without SIMD kernels."""
+        arguments = [self.configuration.fields, self.configuration.near, Q, rows, self.stress_rows, Pi]
         self._launch(_make_stress(self.space, self.configuration.simd), len(rows), arguments)
+
+    def unit(self) -> wp.array:
+        """Π̃ of a unit stress, (n,) of mat, whose dual divergence is −e_a."""
+        reference, near, n = self.configuration.fields, self.configuration.near, len(self._rows)
+        Q = wp.full(n, np.eye(self.space.dim), dtype=self.space.mat, device=self._rows.device)
+        Pi = wp.zeros_like(Q)
+        self._launch(make_pack(self.space), n, [reference, Q, self._rows])
+        self._launch(_make_stress(self.space, False), n, [reference, near, Q, self._rows, self.stress_rows, Pi])
+        return Pi
