@@ -22,7 +22,7 @@ from .reference import Configuration
 from .sensor import SensorField
 from .shifting import Shifter
 from .stabiliser import Stabiliser
-from .updates import make_drift, make_kick, make_predict
+from .updates import make_drift, make_kick, make_mean, make_predict
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,10 @@ class Medium:
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
 
+    def keep_gradients(self, on: bool) -> None:
+        """Have room for the ∇_k v with which a step begins, from the end of the one before."""
+        self.kept = wp.zeros_like(self.grad_v) if on else None
+
     def of(self, state: Any) -> Any:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
         return self._own if state is self._whole else self._own_half
@@ -181,9 +185,23 @@ class Medium:
 
     # the lines of a step
 
-    def velocity_gradient(self, state: Any) -> None:
-        """∇_k v (M4)."""
-        self.configuration.gradient(self.of(state).v, self.grad_v)
+    def velocity_gradient(self, state: Any, out: wp.array | None = None) -> None:
+        """∇_k v (M4), into ``grad_v`` by default."""
+        self.configuration.gradient(self.of(state).v, self.grad_v if out is None else out)
+
+    def keep_gradient(self, state: Any) -> None:
+        """∇_k v of the state in which a step begins, where it is kept."""
+        if self.kept is not None:
+            self.velocity_gradient(state, self.kept)
+
+    def recall_gradient(self) -> None:
+        """∇_k v that was kept."""
+        wp.copy(self.grad_v, self.kept)
+
+    def mean_gradient(self, state: Any) -> None:
+        """∇_k v̄ from ∇_k vⁿ and ∇_k v^{n+1}, which is kept: M4 is linear."""
+        self.keep_gradient(state)
+        self._launch(make_mean(self.space.mat), self.n, [self.kept, self.grad_v])
 
     def gradients(self, state: Any) -> None:
         """∇_k v, and ∇_k F where the smoothing needs it (M4)."""

@@ -44,6 +44,17 @@ class Stepper(World, ABC):
         for medium in self.media:
             medium.velocity_gradient(state)
 
+    def _known_gradient(self, state: Any) -> None:
+        for medium in self.media:
+            if self.steady:
+                medium.recall_gradient()
+            else:
+                medium.velocity_gradient(state)
+
+    def _mean_gradient(self, state: Any) -> None:
+        for medium in self.media:
+            medium.mean_gradient(state)
+
     def _gradients(self, state: Any) -> None:
         for medium in self.media:
             medium.gradients(state)

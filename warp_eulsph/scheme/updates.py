@@ -70,6 +70,19 @@ def make_add(space: Space) -> Any:
 
 
 @functools.cache
+def make_mean(element: Any) -> Any:
+    """Kernel: f ← ½(f + f_new), of vectors or matrices."""
+    half = element._wp_scalar_type_(0.5)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def mean(first: int, f_new: wp.array(dtype=element), f: wp.array(dtype=element)):
+        a = first + wp.tid()
+        f[a] = (f[a] + f_new[a]) * half
+
+    return mean
+
+
+@functools.cache
 def make_kick(space: Space) -> Any:
     """Kernel: v^{n+1} (M8)."""
     real, vec = space.real, space.vec

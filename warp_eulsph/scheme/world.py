@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
@@ -46,6 +46,12 @@ class Parts:
     clock: DeviceClock
 
 
+def _is_steady(media: Sequence[Medium], conditions: Sequence[Bound]) -> bool:
+    """Whether imposed velocities have the mean of a step in its middle, and only the forces change them besides."""
+    imposing = [condition for condition in conditions if type(condition).impose is not Bound.impose]
+    return all(condition.steady for condition in imposing) and all(medium.limiter is None for medium in media)
+
+
 class World:
     """Media under conditions. All that bodies have in common is in one set of arrays, of which media have views.
 
@@ -54,7 +60,11 @@ class World:
         media: in the order of the particles. conditions: imposed in this order.
         interactions: between the media; ``exchanged``: the forces [N] of each, (n,) of vec.
         forces, grad_v: of the last step. clock: time on the device. ledger: where the energy went. steps: taken so far.
+        steady: ∇_k vⁿ is what the last step left (``keeps_gradient``).
     """
+
+    #: Whether the steps want ∇_k v^{n+1} kept for the next one, where conditions are steady and nothing limits v.
+    keeps_gradient: ClassVar[bool] = False
 
     def __init__(self, parts: Parts):
         self.space, self.clock, self.conditions = parts.space, parts.clock, parts.conditions
@@ -67,6 +77,7 @@ class World:
         self.moves_surfaces = not all(medium.policy.fixed for medium in self.media) or any(
             condition.reads_surface for condition in self.conditions
         )
+        self.steady = self.keeps_gradient and _is_steady(self.media, self.conditions)
         self.limiting = [condition for condition in self.conditions if condition.limits]
         self.exchanged = [wp.zeros(n, dtype=space.vec, device=device) for _ in self.interactions]
         self.half = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
@@ -76,6 +87,7 @@ class World:
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         for medium in self.media:
             medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
+            medium.keep_gradients(self.steady)
         self._start([each.surface_given for each in parts.media])
         self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
@@ -109,6 +121,7 @@ class World:
             condition.start(self.U)
         for medium in self.media:
             medium.stabilise(self.U)
+            medium.keep_gradient(self.U)
 
     def _exchanges(self) -> Exchanges | None:
         """The page of the interactions, where there are any."""
@@ -147,6 +160,7 @@ class World:
         """Last part of a refresh, launches only, when the lists have room: neighbours, corrections, balance."""
         for k in due:
             self.media[k].renew(self.U)
+            self.media[k].keep_gradient(self.U)
 
     def _shift(self, U: Any, due: Sequence[int] | None = None) -> None:
         shifted = [m for k, m in enumerate(self.media) if m.shifter is not None and (due is None or k in due)]
@@ -157,9 +171,10 @@ class World:
             self.ledger.book_shift(U)
 
     def rebuild(self) -> None:
-        """Derive what the evolving arrays determine, after they were overwritten."""
+        """Derive what the evolving arrays determine, ∇_k v of U too; to be called when they were overwritten."""
         for medium in self.media:
             medium.rebuild()
+            medium.keep_gradient(self.U)
 
     # what a checkpoint holds
 
