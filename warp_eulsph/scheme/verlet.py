@@ -1,10 +1,11 @@
 """The two-step scheme with the new velocity in the full step of F: Störmer-Verlet on a movable reference (M14)."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import warp as wp
 
+from ..structs import StateArrays
 from .balance import Balance
 from .base import Scheme
 from .dissipation import Upwind
@@ -88,8 +89,8 @@ class VerletStepper(Stepper):
         self.ledger.record(U, half)
         self.clock.tick()
 
-    def _start_mean(self, U: Any, half: Any) -> None:
+    def _start_mean(self, U: StateArrays, half: StateArrays) -> None:
         wp.copy(half.v, U.v)
 
-    def _finish_mean(self, U: Any, half: Any) -> None:
-        self._launch(make_mean(self.space.vec), self.n, [U.v, half.v])
+    def _finish_mean(self, U: StateArrays, half: StateArrays) -> None:
+        self._launch(make_mean(self.space, "vec"), self.n, [U.v, half.v])
