@@ -2,13 +2,13 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
+from ..structs import FluxArrays, ForceArrays, StateArrays
 from .pair_forces import PairForces
 from .reference import Configuration
 from .sensor import Sensor
@@ -38,7 +38,7 @@ class Upwind:
 
 
 @functools.cache
-def upwind(space: Space) -> Any:
+def upwind(space: Space) -> wp.Function:
     """``wp.func`` force on a from b [N]: A_ab ½ [Z n⊗n + Z_s (I − n⊗n)] · jump (M9), A_ab = V_a V_b |W'|.
 
     Z = ½ (ρc_a + ρc_b) is the mean impedance of pressure waves, Z_s of shear waves; n points from a to b as they are
@@ -58,7 +58,7 @@ def upwind(space: Space) -> Any:
 
 
 @functools.cache
-def blend(space: Space) -> Any:
+def blend(space: Space) -> wp.Function:
     """``wp.func`` jump per direction: (1 − d) ε r_ab + d (v_b − v_a), d from the sensor of both ends (M9)."""
     real, vec, dim = space.real, space.vec, space.dim
 
@@ -74,7 +74,7 @@ def blend(space: Space) -> Any:
 
 
 @functools.cache
-def make_dissipation(space: Space, sensed: bool) -> Any:
+def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
     """Kernel: D_a of M9; antisymmetric in the pair."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
@@ -124,11 +124,11 @@ class UpwindForces(Stabiliser):
 
     corrects = False
 
-    def __init__(self, space: Space, device: Any):
+    def __init__(self, space: Space, device: wp.DeviceLike):
         self.space, self.device, self._launch = space, device, Launcher(device)
         self._in_one_pass: PairForces | None = None
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare: M9 needs the lists only."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
@@ -138,13 +138,13 @@ class UpwindForces(Stabiliser):
     def compute(
         self,
         configuration: Configuration,
-        flux: Any,
+        flux: FluxArrays,
         x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
         sensor: wp.array | None,
-        forces: Any,
+        forces: ForceArrays,
     ) -> None:
         """Internal force (M5) and dissipation (M9) into ``forces``."""
         if not self.takes_dual(configuration, sensor is not None):

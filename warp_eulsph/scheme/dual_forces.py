@@ -1,7 +1,6 @@
 """The internal force (M5) alone, where the arrangement is as it was at the start and needs no correction."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -9,12 +8,13 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..simd import BY_TWO_DUAL, packed_rows, prelude
 from ..space import Space
+from ..structs import FluxArrays, ForceArrays, StateArrays
 from .reference import Configuration
 from .stabiliser import Stabiliser
 
 
 @functools.cache
-def _make_pack(space: Space) -> Any:
+def _make_pack(space: Space) -> wp.Kernel:
     """Kernel: columns of Π = Q Lᵀ (M5), made here, each with a coordinate of x, side by side."""
     real, dim = space.real, space.dim
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
@@ -32,7 +32,7 @@ def _make_pack(space: Space) -> Any:
 
 
 @functools.cache
-def _make_forces(space: Space, tilted: bool) -> Any:
+def _make_forces(space: Space, tilted: bool) -> wp.Kernel:
     """Kernel: M5 from packed rows; with tilted weights their Σ own ξ is known (M17), without it is summed here."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -95,11 +95,11 @@ class DualForces(Stabiliser):
 
     corrects = False
 
-    def __init__(self, space: Space, n: int, device: Any):
+    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
         self.space, self._launch = space, Launcher(device)
         self._rows = packed_rows(space, n, space.dim, device)
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
@@ -109,13 +109,13 @@ class DualForces(Stabiliser):
     def compute(
         self,
         configuration: Configuration,
-        flux: Any,
+        flux: FluxArrays,
         x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
         sensor: wp.array | None,
-        forces: Any,
+        forces: ForceArrays,
     ) -> None:
         """Internal force (M5) into ``forces``."""
         if not configuration.simd:

@@ -14,12 +14,13 @@ from ..linalg import det, inverse, largest_shortening
 from ..materials import Law, Material
 from ..materials.base import history_row, long_form
 from ..space import Space
+from ..structs import ClockArrays, FluxArrays, ParticleArrays
 from .policy import Always, Every, ReferencePolicy
 from .reference import Configuration, resolution
 
 
 @functools.cache
-def velocity_gradient(space: Space, fixed: bool) -> Any:
+def velocity_gradient(space: Space, fixed: bool) -> wp.Function:
     """``wp.func`` l = Ḟ F⁻¹ of particle a, whose deformation gradient is F, from ∇_k v."""
     mat, Reference, invert = space.mat, structure(space, "Reference"), inverse(space)
 
@@ -33,7 +34,7 @@ def velocity_gradient(space: Space, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> Any:
+def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> wp.Kernel:
     mat, real, determinant = space.mat, space.real, det(space)
     Reference, Flux, Clock = structure(space, "Reference"), structure(space, "Flux"), clock_structure(space)
     Constants, row, remembers = law.Constants, history_row(space, law), bool(law.history)
@@ -77,7 +78,7 @@ STRAIN = 0.25
 
 
 @functools.cache
-def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
+def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> wp.Kernel:
     real, mat = space.real, space.mat
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Clock, Constants, dim = clock_structure(space), law.Constants, float(space.dim)
@@ -131,7 +132,7 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_moduli(space: Space, law: Law) -> Any:
+def _make_moduli(space: Space, law: Law) -> wp.Kernel:
     """Kernel of one thread: the wave moduli at F = I."""
     real, dim, pair, Constants = space.real, space.dim, space.row(2), law.Constants
     row, moduli = history_row(space, law), long_form(space, law).wave_moduli
@@ -145,7 +146,7 @@ def _make_moduli(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_energy(space: Space, law: Law) -> Any:
+def _make_energy(space: Space, law: Law) -> wp.Kernel:
     mat, row, remembers = space.mat, history_row(space, law), bool(law.history)
     Particles, Constants, density = structure(space, "Particles"), law.Constants, long_form(space, law).energy
 
@@ -169,7 +170,7 @@ def _make_energy(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_forget(space: Space, law: Law) -> Any:
+def _make_forget(space: Space, law: Law) -> wp.Kernel:
     """Kernel: what a law without a history leaves of F after a full step."""
     mat, Constants, kept = space.mat, law.Constants, law.update
 
@@ -182,7 +183,7 @@ def _make_forget(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_update(space: Space, law: Law, fixed: bool) -> Any:
+def _make_update(space: Space, law: Law, fixed: bool) -> wp.Kernel:
     """Kernel: the history after a full step and the energy that it dissipated; a step of length zero changes nothing.
 
     A particle whose history is not finite is bad: its law found no state.
@@ -224,7 +225,7 @@ def _make_update(space: Space, law: Law, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_rebase(space: Space, law: Law) -> Any:
+def _make_rebase(space: Space, law: Law) -> wp.Kernel:
     """Kernel: F and history as a new reference takes them."""
     mat, row, Constants, rebased = space.mat, history_row(space, law), law.Constants, law.rebase
 
@@ -276,7 +277,9 @@ class Flux:
         bodies: particle indices of each body.
     """
 
-    def __init__(self, space: Space, bodies: list[tuple[Material, int]], particles: Any, device: Any):
+    def __init__(
+        self, space: Space, bodies: list[tuple[Material, int]], particles: ParticleArrays, device: wp.DeviceLike
+    ):
         self.space, self.particles, self.device = space, particles, device
         self._launch = Launcher(device)
         self.parts: list[Part] = []
@@ -290,7 +293,7 @@ class Flux:
             first += count
         remembers = any(part.law.history for part in self.parts)
         empty = ("Pi", "tie", "drag") if remembers else ("Pi", "tie", "drag", "dissipated")
-        self.fields = allocate(space, "Flux", first, device, empty=empty)
+        self.fields: FluxArrays = allocate(space, "Flux", first, device, empty=empty)
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
 
     def evolving(self) -> dict[str, wp.array]:
@@ -315,7 +318,7 @@ class Flux:
         return found
 
     def compute(
-        self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any, fraction: float = 0.0
+        self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays, fraction: float = 0.0
     ) -> None:
         """Q of the deformation gradients ``F`` (M1), and Π = Q Lᵀ (M5) if it is kept.
 
@@ -326,7 +329,7 @@ class Flux:
             kernel = _make_flux(self.space, part.law, configuration.fixed, len(self.fields.Pi) > 0)
             self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
 
-    def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
+    def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
         for part in self.parts:
             arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields]
@@ -339,7 +342,7 @@ class Flux:
             arguments = [part.first, F, part.history, self.particles, part.constants, out]
             self._launch(_make_energy(self.space, part.law), part.size, arguments, part.first)
 
-    def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
+    def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """After a full step that ``grad_v`` = ∇_k v made: what each law keeps of F, its history, what it dissipated."""
         for part in self.parts:
             if part.law.history and part.law.update is not None:

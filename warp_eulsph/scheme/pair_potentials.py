@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Sequence
-from typing import Any
 
 import warp as wp
 
@@ -11,6 +10,7 @@ from ..fields import neighbour_structure, structure
 from ..linalg import inverse
 from ..simd import BY_EIGHT_LARGER, OWN_ROW, packed_rows, prelude
 from ..space import Space, difference
+from ..structs import ForceArrays, StateArrays
 from .dissipation import Upwind, blend, upwind
 from .flux import Flux
 from .pair_forces import SQUARES
@@ -25,7 +25,7 @@ def _vectors(space: Space) -> int:
 
 
 @functools.cache
-def _make_pack(space: Space, stressed: bool) -> Any:
+def _make_pack(space: Space, stressed: bool) -> wp.Kernel:
     """Kernel: what the SIMD pass reads of a neighbour, side by side; ∇v F⁻¹ where M9 has a stress, else ∇v."""
     real, vec, mat, dim, invert = space.real, space.vec, space.mat, space.dim, inverse(space)
     Reference, Flux, spin_of = structure(space, "Reference"), structure(space, "Flux"), make_spin(space)
@@ -70,7 +70,7 @@ def _make_pack(space: Space, stressed: bool) -> Any:
 
 
 @functools.cache
-def _make_simd(space: Space, stressed: bool) -> Any:
+def _make_simd(space: Space, stressed: bool) -> wp.Kernel:
     """Kernel of the pass from packed rows, without a sensor; M9 has a stress where ``stressed``."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -188,7 +188,7 @@ def _make_simd(space: Space, stressed: bool) -> Any:
 
 
 @functools.cache
-def _make_spatial(space: Space) -> Any:
+def _make_spatial(space: Space) -> wp.Kernel:
     """Kernel: ∇v F⁻¹, the gradient of v in the present configuration."""
     mat, invert = space.mat, inverse(space)
 
@@ -201,7 +201,7 @@ def _make_spatial(space: Space) -> Any:
 
 
 @functools.cache
-def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dual: bool) -> Any:
+def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dual: bool) -> wp.Kernel:
     """Kernel of the pass; M9 where ``damped``, reconstructed only where v is smooth if ``sensed``.
 
     With a stress (``stressed``) the jump is reconstructed by D = ∇v F⁻¹ between the pair as it is now; without by ∇v in
@@ -298,7 +298,7 @@ class PairPotentials:
         space: Space,
         flux: Flux,
         groups: Sequence[int],
-        device: Any,
+        device: wp.DeviceLike,
     ):
         self.space, self.flux, self._launch = space, flux, Launcher(device)
         damped = dissipation is not None
@@ -317,12 +317,12 @@ class PairPotentials:
     def compute(
         self,
         configuration: Configuration,
-        state: Any,
+        state: StateArrays,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
         sensor: wp.array | None,
-        forces: Any,
+        forces: ForceArrays,
     ) -> None:
         """Forces [N] at x and F of ``state``, ``v`` and ``grad_v``, and their stresses, which are added to Q."""
         reference, near, flux = configuration.fields, configuration.near, self.flux.fields

@@ -1,11 +1,12 @@
 """What keeps the sums of a reference stable: dissipation, and the correction of what the arrangement gets wrong."""
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import warp as wp
 
 from ..space import Space
+from ..structs import FluxArrays, ForceArrays, ParticleArrays, StateArrays
 from .flux import Flux
 from .reference import Configuration
 
@@ -19,7 +20,7 @@ class Correction(ABC):
     has_potentials: ClassVar[bool] = False
 
     @abstractmethod
-    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "Stabiliser":
+    def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "Stabiliser":
         """Allocate for the bodies of ``flux``."""
 
 
@@ -32,7 +33,7 @@ class Stabiliser(ABC):
     psi: wp.array
 
     @abstractmethod
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Prepare for a new reference."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
@@ -47,12 +48,12 @@ class Stabiliser(ABC):
     def compute(
         self,
         configuration: Configuration,
-        flux: Any,
+        flux: FluxArrays,
         x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
         sensor: wp.array | None,
-        forces: Any,
+        forces: ForceArrays,
     ) -> None:
         """Internal force (M5), dissipation (M9, ε, switched by ``sensor``, at x and v) and correction [N]."""
