@@ -72,6 +72,7 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
+        surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
         particles, forces, grad_v: of its own particles, views of what the world has.
     """
@@ -81,6 +82,7 @@ class Medium:
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
+        self.surface_given = parts.surface_given
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
