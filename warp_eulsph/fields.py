@@ -1,7 +1,7 @@
 """The table of array fields, and the ``wp.struct`` types made from it.
 
 Every array that kernels share stands in one table below with its kind, unit and meaning; ``structure`` makes the Warp
-struct of a group and ``allocate`` its arrays, so that the table cannot drift from the code; ``structs.py`` has their
+struct of a group and ``allocate`` its arrays, so that the table cannot drift from the code; ``structs.py`` has the
 names for host code. Shapes: ``real`` (n,), ``vec`` (n,) of (dim,), ``mat`` (n,) of (dim, dim); ``int`` (n,).
 """
 

@@ -21,7 +21,7 @@ from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
 from .shifting import Shifter
-from .stabiliser import Stabiliser
+from .stabiliser import Stabiliser, Sums
 from .updates import make_drift, make_kick, make_predict
 
 
@@ -72,6 +72,7 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
+        surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
         particles, forces, grad_v: of its own particles, views of what the world has.
     """
@@ -81,6 +82,7 @@ class Medium:
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
+        self.surface_given = parts.surface_given
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
@@ -98,7 +100,7 @@ class Medium:
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            simd, upwind = self.configuration.simd and not sensed, options.dissipation if plain else None
+            simd, upwind = self.configuration.pairs_by_simd(sensed), options.dissipation if plain else None
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
@@ -126,6 +128,10 @@ class Medium:
         self._own_half = part(self.space, half, "State", self.span)
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
+        upwind, flux = self.options.dissipation, self.flux.fields
+        epsilon = 0.0 if upwind is None else upwind.epsilon
+        d = None if upwind is None or upwind.sensor is None else self.sensors[upwind.sensor].d
+        self.sums = Sums(self.configuration, flux, self.grad_v, self.forces, epsilon, d)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -217,16 +223,10 @@ class Medium:
 
     def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
-        at, v, options = self.of(state), self.of(rates).v, self.options
-        epsilon, d = 0.0, None
-        if options.dissipation is not None:
-            epsilon = options.dissipation.epsilon
-            if options.dissipation.sensor is not None:
-                d = self.sensors[options.dissipation.sensor].d
+        at, v = self.of(state), self.of(rates).v
         if self.pairs is not None:
-            self.pairs.compute(self.configuration, at, v, self.grad_v, epsilon, d, self.forces)
-        arguments = (self.configuration, self.flux.fields, at.x, v, self.grad_v, epsilon, d, self.forces)
-        self.stabiliser.compute(*arguments)
+            self.pairs.compute(self.sums, at, v)
+        self.stabiliser.compute(self.sums, at.x, v)
 
     def smooth(self, state: StateArrays, out: StateArrays) -> None:
         """S of v and F (M6, M7)."""

@@ -10,11 +10,11 @@ from ..fields import neighbour_structure, repeated, structure
 from ..linalg import inverse
 from ..simd import BY_EIGHT_LARGER, OWN_ROW, packed_rows, prelude
 from ..space import Space, difference
-from ..structs import ForceArrays, StateArrays
+from ..structs import StateArrays
 from .dissipation import Upwind, blend, upwind
 from .flux import Flux
 from .pair_forces import SQUARES
-from .reference import Configuration
+from .stabiliser import Sums
 from .tie import Tie
 from .turning import TURNING, make_spin, make_turned
 
@@ -330,7 +330,7 @@ class PairPotentials:
         groups: Sequence[int],
         device: wp.DeviceLike,
     ):
-        self.space, self.flux, self._launch = space, flux, Launcher(device)
+        self.space, self._launch = space, Launcher(device)
         damped = dissipation is not None
         self._damped, self._simd = damped, simd and damped
         self._stressed = dissipation is not None and dissipation.stress
@@ -350,18 +350,10 @@ class PairPotentials:
         if self._stressed:
             flux.fields.drag = wp.zeros(n, dtype=space.mat, device=device)
 
-    def compute(
-        self,
-        configuration: Configuration,
-        state: StateArrays,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: ForceArrays,
-    ) -> None:
-        """Forces [N] at x and F of ``state``, ``v`` and ``grad_v``, and their stresses, which are added to Q."""
-        reference, near, flux = configuration.fields, configuration.near, self.flux.fields
+    def compute(self, sums: Sums, state: StateArrays, v: wp.array) -> None:
+        """Forces [N] at x and F of ``state`` and velocities ``v``, and their stresses, which are added to Q."""
+        reference, near, flux = sums.configuration.fields, sums.configuration.near, sums.flux
+        grad_v, epsilon, forces = sums.grad_v, sums.epsilon, sums.forces
         if self._simd:
             arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
             self._launch(_make_pack(self.space, self._stressed), len(v), arguments)
@@ -372,8 +364,17 @@ class PairPotentials:
             return
         if self._damped:
             self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
-        sensed, dual = sensor is not None, len(flux.Pi) > 0
+        sensed, dual = sums.sensor is not None, len(flux.Pi) > 0
         kernel = _make_portable(self.space, self._damped, self._stressed, sensed, dual, self._yielding)
         for body, modulus in self._bodies:
-            arguments = [reference, near, state.x, state.F, v, grad_v, self._D, v if sensor is None else sensor]
+            arguments = [
+                reference,
+                near,
+                state.x,
+                state.F,
+                v,
+                grad_v,
+                self._D,
+                v if sums.sensor is None else sums.sensor,
+            ]
             self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)

@@ -109,6 +109,8 @@ class World:
             condition.start(self.U)
         for medium in self.media:
             medium.stabilise(self.U)
+        for interaction in self.interactions:
+            interaction.start(self)
 
     def _exchanges(self) -> Exchanges | None:
         """The page of the interactions, where there are any."""
@@ -160,6 +162,8 @@ class World:
         """Derive what the evolving arrays determine, after they were overwritten."""
         for medium in self.media:
             medium.rebuild()
+        for interaction in self.interactions:
+            interaction.rebuild(self)
 
     # what a checkpoint holds
 
