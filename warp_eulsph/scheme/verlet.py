@@ -53,7 +53,7 @@ class Verlet(Scheme):
 
 
 class VerletStepper(Stepper):
-    """M14 at work, by one gradient a step where conditions are steady and by two where they are not."""
+    """M14 at work, by one gradient a step in media whose conditions are steady and by two in others."""
 
     keeps_gradient = True
 
@@ -65,25 +65,19 @@ class VerletStepper(Stepper):
         self._sense(U)  # §5: d of vⁿ, and the diffusion of Uⁿ
         self._start_mean(U, half)  # vⁿ into v̄
         self._drift(U, U, 0.5, half)  # M14: F^{n+½}, x^{n+½}
-        if not self.steady:  # steady conditions find nothing to change in vⁿ
-            self._impose(half, 0.5)
+        self._impose(half, 0.5, steady=False)
         self._stress(half, 0.5)  # M1
         self._sum_forces(half, U, 0.5)  # M5 of F^{n+½}, M9 of vⁿ
         self._kick(U)  # M14: v^{n+1}
-        if self.steady:
-            self._release(U)  # the free velocity, for the reactions
-            self._impose(U, 1.0)
-            self._finish_mean(U, half)  # v̄ = ½(vⁿ + v^{n+1})
-            self._mean_gradient(U)  # M4: ∇_k v̄ = ½(∇_k vⁿ + ∇_k v^{n+1}), the latter for the next step too
-            self._drift(U, half, 1.0, U)  # M14: F^{n+1}, x^{n+1}
-        else:
-            self._finish_mean(U, half)
-            self._impose(half, 0.5)
-            self._velocity_gradient(half)  # M4: ∇_k v̄
-            self._drift(U, half, 1.0, U)
-            self._limit(U)  # §5: U^{n+1} += d × diffusion
-            self._release(U)
-            self._impose(U, 1.0)
+        self._release(U, steady=True)  # the free velocity, for the reactions
+        self._impose(U, 1.0, steady=True)
+        self._finish_mean(U, half)  # v̄ = ½(vⁿ + v^{n+1})
+        self._impose(half, 0.5, steady=False)
+        self._mean_gradient(U, half)  # M4: ∇_k v̄, by ∇_k v^{n+1} for the next step where all is steady
+        self._drift(U, half, 1.0, U)  # M14: F^{n+1}, x^{n+1}
+        self._limit(U)  # §5: U^{n+1} += d × diffusion
+        self._release(U, steady=False)
+        self._impose(U, 1.0, steady=False)
         self._update(U)  # histories; liquids keep J only
         self._check(U)
         self.ledger.record(U, half)
