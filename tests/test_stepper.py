@@ -242,7 +242,7 @@ def test_where_velocities_have_no_mean_a_step_takes_two_gradients(boundaries, li
 def test_a_body_is_steady_for_itself():
     """What moves one body in time takes the second gradient of that body, and of those it shares a condition with."""
     solid = es.Body(x=lattice(2, 5), volume=1 / 25, material=RUBBER, name="solid", reference=es.Never())
-    liquid = es.Body(x=lattice(2, 5) + 2.0, volume=1 / 25, material=RUBBER, name="liquid", reference=es.Always())
+    liquid = es.Body(x=lattice(2, 5) + 2.0, volume=1 / 25, material=RUBBER, name="liquid", arrangement=es.Current())
     moved = es.Motion(lambda X, t: 0.0 * X + t, lambda X: X[:, 0] > 2.8, body="liquid")
     for held, steady in (([es.Fixed(lambda X: X[:, 0] < 0.2)], [True, False]), ([es.Fixed(axes=[0])], [False, False])):
         simulation = es.Simulation([solid, liquid], boundaries=[*held, moved])
