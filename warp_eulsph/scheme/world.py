@@ -109,13 +109,18 @@ class World:
             condition.start(self.U)
         for medium in self.media:
             medium.stabilise(self.U)
+        for interaction in self.interactions:
+            interaction.start(self)
 
     def _exchanges(self) -> Exchanges | None:
         """The page of the interactions, where there are any."""
         if not self.interactions:
             return None
         between = zip(self.interactions, self.exchanged, strict=True)
-        listed = [Exchange(forces, functools.partial(interaction.energy, self)) for interaction, forces in between]
+        listed = [
+            Exchange(forces, functools.partial(interaction.energy, self), interaction.supplied)
+            for interaction, forces in between
+        ]
         return Exchanges(self.space, self.particles, self.clock.fields, listed, self.device)
 
     # the references
