@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 import warp_eulsph
+from warp_eulsph import structs
+from warp_eulsph.fields import GROUPS, clock_structure, neighbour_structure
+from warp_eulsph.space import Space
 
 PACKAGE = Path(__file__).parents[1] / "warp_eulsph"
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -16,7 +19,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
     {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"}
-    | {"kernel_cache"},
+    | {"kernel_cache", "structs"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
     {"operators"},
     {"scheme", "interactions"},
@@ -171,3 +174,20 @@ def test_cases_run_without_any_extra(tmp_path):
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert "pictures need matplotlib: pip install 'warp_eulsph[viz]'" in ran.stderr
+
+
+PROTOCOLS = [value for value in vars(structs).values() if getattr(value, "__module__", "") == structs.__name__]
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_protocols_have_the_arrays_of_their_struct(protocol):
+    """What host code is checked by is what kernels get."""
+    space = Space(2)
+    made = {"NeighbourRows": neighbour_structure, "ClockArrays": clock_structure}
+    tables = {"ParticleArrays": "Particles", "StateArrays": "State", "ReferenceArrays": "Reference"}
+    tables |= {"FluxArrays": "Flux", "ForceArrays": "Forces"}
+    if protocol.__name__ in made:
+        names = list(made[protocol.__name__](space).vars)
+    else:
+        names = list(GROUPS[tables[protocol.__name__]])
+    assert list(protocol.__annotations__) == names

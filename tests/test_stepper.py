@@ -73,8 +73,7 @@ def test_limited_correction_never_feeds_more_than_the_dissipation_takes():
         stepper._velocity_gradient(stepper.U)
         stepper._stress(stepper.U, 0.0)
         U = stepper.U
-        arguments = [stepper.configuration, stepper.flux.fields, U.x, U.v, stepper.grad_v, 1.0, None, stepper.forces]
-        stabiliser.compute(*arguments)
+        stabiliser.compute(stepper.medium.sums, U.x, U.v)
         v = stepper.U.v.numpy()
         return (stepper.forces.correction.numpy() * v).sum(), (stepper.forces.dissipation.numpy() * v).sum()
 

@@ -28,7 +28,7 @@ def tied(simulation, x, F):
     stepper.U.x.assign(x)
     stepper.U.F.assign(F)
     medium, U = stepper.medium, stepper.U
-    medium.pairs.compute(medium.configuration, U, U.v, stepper.grad_v, 0.0, None, medium.forces)
+    medium.pairs.compute(medium.sums, U, U.v)
     return stepper.forces.tie.numpy().astype(float), stepper.flux.fields.tie.numpy().astype(float)
 
 

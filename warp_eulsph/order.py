@@ -42,7 +42,7 @@ class Order:
         places: place of each particle by number, (n,) int32.
     """
 
-    def __init__(self, n: int, device: Any):
+    def __init__(self, n: int, device: wp.DeviceLike):
         self.device, self.places = device, np.arange(n, dtype=np.int32)
         self.ids = wp.array(self.places, dtype=wp.int32, device=device)
         # Arrays to be kept right, by weak references, for those who use them hold them; and what they should hold

@@ -3,12 +3,12 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region, unit_vector
 
 
@@ -31,7 +31,7 @@ class Roller(Boundary):
 
 
 @functools.cache
-def _make_impose(space: Space) -> Any:
+def _make_impose(space: Space) -> wp.Kernel:
     vec = space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -56,6 +56,6 @@ class BoundRoller(Bound):
         self.indices = assembly.select(condition.region, condition.body, who)
         self._places = assembly.order.places_of(self.indices)
 
-    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+    def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         arguments = [self._places, self.space.vec(*self.normal), state.v]
         self._launch(_make_impose(self.space), len(self.indices), arguments)

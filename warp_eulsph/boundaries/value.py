@@ -10,11 +10,12 @@ from ..checks import real_array, spread
 from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
+from ..structs import ClockArrays
 from .base import Assembly, check_takes, read_only
 
 
 @functools.cache
-def _make_evaluate(space: Space, components: int, function: Any) -> Any:
+def _make_evaluate(space: Space, components: int, function: Any) -> wp.Kernel:
     real, vec, value = space.real, space.vec, space.row(components)
     Clock = clock_structure(space)
 
@@ -80,7 +81,7 @@ class Value:
         """Whether the rows need no Python function."""
         return self.function is None or self.on_device
 
-    def at(self, x: wp.array, clock: Any, fraction: float) -> wp.array:
+    def at(self, x: wp.array, clock: ClockArrays, fraction: float) -> wp.array:
         """The rows at positions ``x`` [m] and time t + fraction · Δt, (k,)."""
         if self.on_device:
             kernel = _make_evaluate(self.space, self.components, self.function)

@@ -5,6 +5,7 @@ from .free import Free
 from .rigid import BoundRigidBody, RigidBody
 from .rigid_motion import Driven, Held, Moving, RigidMotion
 from .shapes import Box, Cylinder, Plane, Shape, Sphere
+from .skin import Skin
 
 __all__ = [
     "BoundInteraction",
@@ -20,5 +21,6 @@ __all__ = [
     "RigidBody",
     "RigidMotion",
     "Shape",
+    "Skin",
     "Sphere",
 ]

@@ -42,6 +42,9 @@ class BoundInteraction(ABC):
     def start(self, world: "World") -> None:  # noqa: B027  (most need no more than bind knows)
         """Prepare from the initial state, when references and surface vectors are there; called once."""
 
+    def rebuild(self, world: "World") -> None:  # noqa: B027
+        """Derive what the evolving arrays determine, after they were overwritten or particles changed places."""
+
     @abstractmethod
     def forces(self, world: "World", state: Any, fraction: float, out: wp.array) -> None:
         """Add forces [N] at ``state``, at time t + fraction · Δt, to ``out``, (n,) of vec by place.

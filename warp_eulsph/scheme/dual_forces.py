@@ -1,7 +1,6 @@
 """The internal force (M5) alone, where the arrangement is as it was at the start and needs no correction."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -9,12 +8,13 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..simd import BY_TWO_DUAL, packed_rows, prelude
 from ..space import Space
+from ..structs import StateArrays
 from .reference import Configuration
-from .stabiliser import Stabiliser
+from .stabiliser import Stabiliser, Sums
 
 
 @functools.cache
-def _make_pack(space: Space) -> Any:
+def _make_pack(space: Space) -> wp.Kernel:
     """Kernel: columns of Π = Q Lᵀ (M5), made here, each with a coordinate of x, side by side."""
     real, dim = space.real, space.dim
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
@@ -32,7 +32,7 @@ def _make_pack(space: Space) -> Any:
 
 
 @functools.cache
-def _make_forces(space: Space, tilted: bool) -> Any:
+def _make_forces(space: Space, tilted: bool) -> wp.Kernel:
     """Kernel: M5 from packed rows; with tilted weights their Σ own ξ is known (M17), without it is summed here."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -95,33 +95,23 @@ class DualForces(Stabiliser):
 
     corrects = False
 
-    def __init__(self, space: Space, n: int, device: Any):
+    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
         self.space, self._launch = space, Launcher(device)
         self._rows = packed_rows(space, n, space.dim, device)
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
         """The portable kernel does, the SIMD pass makes its own."""
         return not configuration.simd
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: Any,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: Any,
-    ) -> None:
-        """Internal force (M5) into ``forces``."""
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5)."""
+        configuration, internal = sums.configuration, sums.forces.internal
         if not configuration.simd:
-            configuration.divergence(flux.Pi, forces.internal)
+            configuration.divergence(sums.flux.Pi, internal)
             return
-        n = len(forces.internal)
-        self._launch(_make_pack(self.space), n, [configuration.fields, flux, self._rows])
+        self._launch(_make_pack(self.space), len(internal), [configuration.fields, sums.flux, self._rows])
         kernel = _make_forces(self.space, configuration.tilt is not None)
-        self._launch(kernel, n, [configuration.fields, configuration.near, self._rows, forces.internal])
+        self._launch(kernel, len(internal), [configuration.fields, configuration.near, self._rows, internal])

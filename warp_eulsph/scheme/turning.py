@@ -6,7 +6,6 @@ pair's length is not counted, for there other particles are as near, and positio
 """
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -14,7 +13,7 @@ from ..space import Space, vector_type
 
 
 @functools.cache
-def make_spin(space: Space) -> Any:
+def make_spin(space: Space) -> wp.Function:
     """``wp.func`` ω of the antisymmetric part W of a velocity gradient, W r = ω × r, in three dimensions."""
     real, mat, dim, vec3 = space.real, space.mat, space.dim, vector_type(3, space.real)
 
@@ -32,7 +31,7 @@ def make_spin(space: Space) -> Any:
 
 
 @functools.cache
-def make_turned(space: Space) -> Any:
+def make_turned(space: Space) -> wp.Function:
     """``wp.func`` (ω, r, most) -> ω × r, r cut to the length ``most``."""
     real, vec, dim, vec3 = space.real, space.vec, space.dim, vector_type(3, space.real)
 

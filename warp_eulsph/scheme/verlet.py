@@ -2,11 +2,12 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import warp as wp
 
 from ..space import Space
+from ..structs import StateArrays
 from .balance import Balance
 from .base import Scheme
 from .dissipation import Upwind
@@ -53,7 +54,7 @@ class Verlet(Scheme):
 
 
 @functools.cache
-def _make_mean(space: Space) -> Any:
+def _make_mean(space: Space) -> wp.Kernel:
     """Kernel: v ← ½(v + v_new)."""
     real, vec = space.real, space.vec
 
@@ -92,8 +93,8 @@ class VerletStepper(Stepper):
         self.ledger.record(U, half)
         self.clock.tick()
 
-    def _start_mean(self, U: Any, half: Any) -> None:
+    def _start_mean(self, U: StateArrays, half: StateArrays) -> None:
         wp.copy(half.v, U.v)
 
-    def _finish_mean(self, U: Any, half: Any) -> None:
+    def _finish_mean(self, U: StateArrays, half: StateArrays) -> None:
         self._launch(_make_mean(self.space), self.n, [U.v, half.v])

@@ -3,7 +3,6 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
@@ -13,6 +12,7 @@ from ..fields import allocate, arrays, repeated
 from ..interactions import BoundInteraction
 from ..operators.neighbours import NeighbourLists
 from ..space import Space
+from ..structs import ForceArrays, ParticleArrays, StateArrays
 from .exchanges import Exchange, Exchanges
 from .flux import Flux, Part
 from .ledger import Ledger
@@ -38,8 +38,8 @@ class Parts:
     """
 
     space: Space
-    U: Any
-    particles: Any
+    U: StateArrays
+    particles: ParticleArrays
     media: Sequence[MediumParts]
     conditions: Sequence[Bound]
     interactions: Sequence[BoundInteraction]
@@ -69,7 +69,7 @@ class World:
         )
         self.limiting = [condition for condition in self.conditions if condition.limits]
         self.exchanged = [wp.zeros(n, dtype=space.vec, device=device) for _ in self.interactions]
-        self.half = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
+        self.half: StateArrays = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
         if not self.moves_surfaces:
             self.half.surface = self.U.surface
         self.forces = self._allocate_forces()
@@ -80,7 +80,7 @@ class World:
         self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
 
-    def _allocate_forces(self) -> Any:
+    def _allocate_forces(self) -> ForceArrays:
         """Struct ``Forces``, where those that are always zero take the memory of one."""
         n, vec, device = self.n, self.space.vec, self.device
         self.damped = any(condition.damps for condition in self.conditions)
@@ -91,7 +91,7 @@ class World:
             "external": self.loaded,
             "damping": self.damped,
         }
-        forces = allocate(self.space, "Forces", n, device, empty=there)
+        forces: ForceArrays = allocate(self.space, "Forces", n, device, empty=there)
         self._zero = wp.zeros(1, dtype=vec, device=device)
         for name, needed in there.items():
             setattr(forces, name, wp.zeros(n, dtype=vec, device=device) if needed else repeated(self._zero, n))
@@ -153,7 +153,7 @@ class World:
         for k in due:
             self.media[k].renew(self.U)
 
-    def _shift(self, U: Any, due: Sequence[int] | None = None) -> None:
+    def _shift(self, U: StateArrays, due: Sequence[int] | None = None) -> None:
         shifted = [m for k, m in enumerate(self.media) if m.shifter is not None and (due is None or k in due)]
         for medium in shifted:
             medium.shift(U)
@@ -165,6 +165,8 @@ class World:
         """Derive what the evolving arrays determine, after they were overwritten."""
         for medium in self.media:
             medium.rebuild()
+        for interaction in self.interactions:
+            interaction.rebuild(self)
 
     # what a checkpoint holds
 
@@ -222,6 +224,6 @@ class World:
 
     # lines of a step
 
-    def _impose(self, state: Any, fraction: float) -> None:
+    def _impose(self, state: StateArrays, fraction: float) -> None:
         for condition in self.conditions:
             condition.impose(state, self.clock.fields, fraction)
