@@ -148,7 +148,10 @@ class World:
         if not self.interactions:
             return None
         between = zip(self.interactions, self.exchanged, strict=True)
-        listed = [Exchange(forces, functools.partial(interaction.energy, self)) for interaction, forces in between]
+        listed = [
+            Exchange(forces, functools.partial(interaction.energy, self), interaction.supplied)
+            for interaction, forces in between
+        ]
         return Exchanges(self.space, self.particles, self.clock.fields, listed, self.device)
 
     # the references
