@@ -21,10 +21,10 @@ LAYERS = [
     {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"}
     | {"kernel_cache", "structs"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
-    {"operators"},
+    {"operators", "memory", "geometry"},
     {"scheme", "interactions"},
     {"body", "overlap"},
-    {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building", "settling"},
+    {"progress", "diagnostics", "sorting", "arguments", "failure", "building", "settling"},
     {"output"},  # below what it records, of which it knows protocols only
     {"simulation", "looks", "transport", "programs"},
     {"validation", "pictures", "bench"},
