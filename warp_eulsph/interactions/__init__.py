@@ -1,6 +1,26 @@
 """Interactions: forces between bodies, or between bodies and something that moves beside them."""
 
 from .base import BoundInteraction, Interaction
+from .free import Free
+from .rigid import BoundRigidBody, RigidBody
+from .rigid_motion import Driven, Held, Moving, RigidMotion
+from .shapes import Box, Cylinder, Plane, Shape, Sphere
 from .skin import Skin
 
-__all__ = ["BoundInteraction", "Interaction", "Skin"]
+__all__ = [
+    "BoundInteraction",
+    "BoundRigidBody",
+    "Box",
+    "Cylinder",
+    "Driven",
+    "Free",
+    "Held",
+    "Interaction",
+    "Moving",
+    "Plane",
+    "RigidBody",
+    "RigidMotion",
+    "Shape",
+    "Skin",
+    "Sphere",
+]
