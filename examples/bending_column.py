@@ -33,12 +33,12 @@ def build(dim: int, n: int, reference: es.ReferencePolicy) -> es.Simulation:
     velocity[:, 0] = 10.0 * x[:, 1] / HEIGHT
     rubber = es.NeoHookean(density=1100.0, young=17e6, poisson=0.45 if dim == 3 else 0.3)
     column = es.Body(x=x, volume=volume, material=rubber, velocity=velocity)
-    base = es.Clamped(point=np.zeros(dim), normal=-np.eye(dim)[1])
+    base = es.Clamped(point=(0.0,) * dim, normal=(0.0, -1.0, 0.0)[:dim])
     return es.Simulation(column, boundaries=[base], reference=reference)
 
 
 def figures(dim: int, n: int, history: History, residual: float, bent: History) -> list[Figure]:
-    """The bands are measured ones: an error that falls with the spacing, energy lost to the dissipation. Later swings have none."""
+    """The bands are measured ones: an error that falls with the spacing, energy lost to M9. Later swings have none."""
     first = bent["t"] < FIRST_SWING
     reference = bent["utx"][first].max() if dim == 3 else TIP_2D
     top = history["tip"][history["t"] <= FIRST_SWING].argmax()

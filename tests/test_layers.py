@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 import warp_eulsph
+from warp_eulsph import structs
+from warp_eulsph.fields import GROUPS, clock_structure, neighbour_structure
+from warp_eulsph.space import Space
 
 PACKAGE = Path(__file__).parents[1] / "warp_eulsph"
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -16,12 +19,12 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Rooms and single files of the package, lowest layer first: a file imports from its own layer or below, never upwards.
 LAYERS = [
     {"space", "linalg", "execution", "turns", "atomics", "simd", "order", "checks", "notices", "whole", "options"}
-    | {"kernel_cache"},
+    | {"kernel_cache", "structs"},
     {"fields", "weights", "materials", "boundaries", "reduce", "schedule", "summary"},
-    {"operators"},
+    {"operators", "memory", "geometry"},
     {"scheme", "interactions"},
     {"body", "overlap"},
-    {"progress", "diagnostics", "memory", "sorting", "geometry", "arguments", "failure", "building", "settling"},
+    {"progress", "diagnostics", "sorting", "arguments", "failure", "building", "settling"},
     {"output"},  # below what it records, of which it knows protocols only
     {"simulation", "looks", "transport", "programs"},
     {"validation", "pictures", "bench"},
@@ -139,6 +142,12 @@ class TestFile:
         assert not [word for word in ("TO" + "DO", "FIX" + "ME", "X" * 3) if word in text]
 
 
+def test_tests_and_examples_are_short():
+    files = [path for folder in ("tests", "examples") for path in (PACKAGE.parent / folder).rglob("*.py")]
+    long = [path.name for path in files if len(path.read_text(encoding="utf-8").splitlines()) > MAX_LINES]
+    assert len(files) > 90 and not long
+
+
 HEAVY = ("h5py", "matplotlib", "vtkmodules", "pyvista", "meshio", "PIL", "pydantic", "xarray", "pandas")
 
 
@@ -171,3 +180,20 @@ def test_cases_run_without_any_extra(tmp_path):
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert "pictures need matplotlib: pip install 'warp_eulsph[viz]'" in ran.stderr
+
+
+PROTOCOLS = [value for value in vars(structs).values() if getattr(value, "__module__", "") == structs.__name__]
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_protocols_have_the_arrays_of_their_struct(protocol):
+    """What host code is checked by is what kernels get."""
+    space = Space(2)
+    made = {"NeighbourRows": neighbour_structure, "ClockArrays": clock_structure}
+    tables = {"ParticleArrays": "Particles", "StateArrays": "State", "ReferenceArrays": "Reference"}
+    tables |= {"FluxArrays": "Flux", "ForceArrays": "Forces"}
+    if protocol.__name__ in made:
+        names = list(made[protocol.__name__](space).vars)
+    else:
+        names = list(GROUPS[tables[protocol.__name__]])
+    assert list(protocol.__annotations__) == names

@@ -1,7 +1,6 @@
 """Least and largest values that several threads may write to; Warp's own on the CPU are for one thread."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -19,7 +18,7 @@ _SNIPPET = """
 
 
 @functools.cache
-def raise_to(real: type) -> Any:
+def raise_to(real: type) -> wp.Function:
     """``wp.func`` (target, value): target[0] ← max(target[0], value); NaN changes nothing."""
     name = "double" if real is wp.float64 else "float"
 

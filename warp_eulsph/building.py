@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import warp as wp
 
 from .body import Body, groups_of
 from .failure import place_of
@@ -17,6 +18,7 @@ from .scheme.policy import Never, ReferencePolicy
 from .scheme.reference import Configuration
 from .scheme.world import World
 from .space import Space
+from .structs import ParticleArrays, StateArrays
 from .weights import Weight
 
 
@@ -58,7 +60,9 @@ class MediumPlan:
         """Support radius in spacings."""
         return self.options.weight.support * self.options.dilation
 
-    def build(self, space: Space, particles: Any, box: Any, device: Any) -> MediumParts:
+    def build(
+        self, space: Space, particles: ParticleArrays, box: Sequence[float], device: wp.DeviceLike
+    ) -> MediumParts:
         """Allocate; ``particles`` are those of all media."""
         scheme, policy, given = self.options.scheme, self.options.reference, self.bodies[0].surface is not None
         own = part(space, particles, "Particles", self.span)
@@ -123,14 +127,14 @@ def ranges_of(bodies: Sequence[Body]) -> dict[str, range]:
     return {body.name: range(ends[i], ends[i + 1]) for i, body in enumerate(bodies)}
 
 
-def make_particles(space: Space, media: Sequence[MediumPlan], device: Any) -> Any:
+def make_particles(space: Space, media: Sequence[MediumPlan], device: wp.DeviceLike) -> ParticleArrays:
     """Struct ``Particles`` of all media."""
     bodies = [body for medium in media for body in medium.bodies]
     dilations = np.concatenate([np.full(medium.n, medium.options.dilation) for medium in media])
     counts = [len(body.x) for body in bodies]
     volume, spacing = (np.concatenate([getattr(body, name) for body in bodies]) for name in ("volume", "spacing"))
     density = np.repeat([body.material.density for body in bodies], counts)
-    particles = allocate(space, "Particles", len(volume), device)
+    particles: ParticleArrays = allocate(space, "Particles", len(volume), device)
     particles.mass.assign(density * volume)
     particles.V0.assign(volume)
     particles.h.assign(dilations * spacing)
@@ -141,10 +145,10 @@ def make_particles(space: Space, media: Sequence[MediumPlan], device: Any) -> An
     return particles
 
 
-def make_state(space: Space, bodies: Sequence[Body], device: Any) -> Any:
+def make_state(space: Space, bodies: Sequence[Body], device: wp.DeviceLike) -> StateArrays:
     """Struct ``State`` of the bodies at the start."""
     X = np.concatenate([body.x for body in bodies])
-    U = allocate(space, "State", len(X), device)
+    U: StateArrays = allocate(space, "State", len(X), device)
     U.x.assign(X)
     U.v.assign(np.concatenate([body.velocity for body in bodies]))
     U.F.assign(np.broadcast_to(np.eye(space.dim), (len(X), space.dim, space.dim)))

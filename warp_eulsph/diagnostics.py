@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -14,13 +13,14 @@ from .linalg import det, inverse
 from .reduce import Sum, SumOfParticles
 from .scheme.medium import Medium
 from .space import Space, difference
+from .structs import ForceArrays, ParticleArrays, StateArrays
 
 _Vec6 = wp.types.vector(length=6, dtype=wp.float64)
 _Vec11 = wp.types.vector(length=11, dtype=wp.float64)
 
 
 @functools.cache
-def _make_momenta(space: Space) -> Any:
+def _make_momenta(space: Space) -> wp.Kernel:
     """Kernel of ``SumOfParticles``: (m v, m x × v), padded to 3-D."""
     Particles, State, dim = structure(space, "Particles"), structure(space, "State"), space.dim
 
@@ -42,7 +42,7 @@ def _make_momenta(space: Space) -> Any:
 
 
 @functools.cache
-def _make_jacobian(space: Space) -> Any:
+def _make_jacobian(space: Space) -> wp.Kernel:
     real, mat = space.real, space.mat
     determinant = det(space)
 
@@ -55,7 +55,7 @@ def _make_jacobian(space: Space) -> Any:
 
 
 @functools.cache
-def _make_extrema(space: Space) -> Any:
+def _make_extrema(space: Space) -> wp.Kernel:
     """Kernel: largest −det F, det F and speed; maxima do not depend on the order."""
     State, determinant, real = structure(space, "State"), det(space), space.real
     raise_largest = raise_to(real)
@@ -78,7 +78,7 @@ def _make_extrema(space: Space) -> Any:
 
 
 @functools.cache
-def _make_mismatch(space: Space, fixed: bool) -> Any:
+def _make_mismatch(space: Space, fixed: bool) -> wp.Kernel:
     """Kernel: root of the mean square of r_ab (M16) since the last refresh, weighted as in M4, over the spacing."""
     real, mat, dim = space.real, space.mat, space.dim
     Particles, Reference, State = (
@@ -121,7 +121,7 @@ def _make_mismatch(space: Space, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_body_sums(space: Space) -> Any:
+def _make_body_sums(space: Space) -> wp.Kernel:
     """Kernel: (m, m x, m v, m x × v, ½ m v²) of each particle of a body, padded to 3-D, ghosts left out."""
     Particles, State, dim = structure(space, "Particles"), structure(space, "State"), space.dim
 
@@ -142,7 +142,7 @@ def _make_body_sums(space: Space) -> Any:
 
 
 @functools.cache
-def _make_section(space: Space) -> Any:
+def _make_section(space: Space) -> wp.Kernel:
     """Kernel: the force that other particles exert on those listed, padded to 3-D."""
     Forces, dim = structure(space, "Forces"), space.dim
 
@@ -166,12 +166,12 @@ class BodySums:
         body: its range of particles.
     """
 
-    def __init__(self, space: Space, particles: Any, body: range, device: Any):
+    def __init__(self, space: Space, particles: ParticleArrays, body: range, device: wp.DeviceLike):
         self.space, self.particles, self.body, self._launch = space, particles, body, Launcher(device)
         self._each = wp.zeros(len(body), dtype=_Vec11, device=device)
         self._total, self._sum = wp.zeros(1, dtype=_Vec11, device=device), Sum(_Vec11, len(body), device)
 
-    def __call__(self, state: Any) -> dict[str, np.ndarray]:
+    def __call__(self, state: StateArrays) -> dict[str, np.ndarray]:
         """Of ``state``: centre of mass [m] and momentum [kg m/s], (dim,); angular momentum about the origin
         [kg m²/s], (3,); kinetic energy [J], ()."""
         arguments = [self.body.start, self.particles, state, self._each]
@@ -199,7 +199,7 @@ class SectionForce:
         self._each, self._total = (wp.zeros(k, dtype=wp.vec3d, device=self.device) for k in (len(places), 1))
         self._sum = Sum(wp.vec3d, len(places), self.device)
 
-    def __call__(self, forces: Any) -> np.ndarray:
+    def __call__(self, forces: ForceArrays) -> np.ndarray:
         """[N], (dim,), from the step's ``forces``: what acts between the particles themselves cancels in the sum."""
         arguments = [self._places, forces, self._each]
         self._launch(_make_section(self.space), len(self._places), arguments)
@@ -210,7 +210,7 @@ class SectionForce:
 class Diagnostics:
     """Sums and extrema over all particles of a state, and its volume ratios."""
 
-    def __init__(self, space: Space, particles: Any, device: Any):
+    def __init__(self, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
         self.space, self.particles, self.device = space, particles, device
         self._launch = Launcher(device)
         self._total = wp.zeros(1, dtype=_Vec6, device=device)
@@ -219,7 +219,7 @@ class Diagnostics:
         self._mismatch = wp.zeros(0, dtype=space.real, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
 
-    def mismatch(self, media: Sequence[Medium], state: Any) -> tuple[wp.array, float]:
+    def mismatch(self, media: Sequence[Medium], state: StateArrays) -> tuple[wp.array, float]:
         """How far positions and F disagree around each particle, in spacings, (n,) on the device, and the largest."""
         if len(self._mismatch) == 0:
             self._mismatch = wp.zeros(len(state.x), dtype=self.space.real, device=self.device)
@@ -231,13 +231,13 @@ class Diagnostics:
             self._launch(kernel, medium.n, [*arguments, self._largest])
         return self._mismatch, float(self._largest.numpy()[0])
 
-    def momenta(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
+    def momenta(self, state: StateArrays) -> tuple[np.ndarray, np.ndarray]:
         """Linear [kg m/s] and angular momentum about the origin [kg m²/s], both padded to (3,)."""
         self._sum(_make_momenta(self.space), [self.particles, state], self._total)
         total = self._total.numpy()[0].copy()
         return total[:3], total[3:]
 
-    def extrema(self, state: Any) -> tuple[float, float, float]:
+    def extrema(self, state: StateArrays) -> tuple[float, float, float]:
         """Least and largest det F [-], and largest speed [m/s]."""
         for array, least in zip(self._extrema, (-np.inf, -np.inf, 0.0), strict=True):
             array.fill_(least)
@@ -245,11 +245,11 @@ class Diagnostics:
         most_negative, largest, speed = (float(array.numpy()[0]) for array in self._extrema)
         return -most_negative, largest, speed
 
-    def jacobians(self, state: Any) -> np.ndarray:
+    def jacobians(self, state: StateArrays) -> np.ndarray:
         """det F of each particle, (n,)."""
         return self.volume_ratios(state).numpy()
 
-    def volume_ratios(self, state: Any) -> wp.array:
+    def volume_ratios(self, state: StateArrays) -> wp.array:
         """det F of each particle, (n,), on the device."""
         found = wp.empty(len(state.F), dtype=self.space.real, device=self.device)
         launch(_make_jacobian(self.space), len(found), [state.F, found], self.device)

@@ -75,7 +75,7 @@ def set_simd(on: bool) -> None:
     _simd = on
 
 
-def simd(device: Any) -> bool:
+def simd(device: wp.DeviceLike) -> bool:
     """Whether SIMD kernels are to be used on this device.
 
     Raises:
@@ -92,7 +92,7 @@ def set_graphs(on: bool | None = None) -> None:
     _graphs = on
 
 
-def graphs(device: Any, n: int) -> bool:
+def graphs(device: wp.DeviceLike, n: int) -> bool:
     """Whether steps of ``n`` particles on this device are to be recorded as graphs.
 
     By default on GPUs whose driver knows conditional graphs, and on the CPU where launches are too short for threads: a
@@ -116,11 +116,11 @@ class Launcher:
     What fields of a struct point to may change in between.
     """
 
-    def __init__(self, device: Any):
+    def __init__(self, device: wp.DeviceLike):
         self.device = wp.get_device(device)
         self._recorded: dict[tuple[Any, ...], tuple[list[Any], Any]] = {}
 
-    def __call__(self, kernel: Any, n: int, arguments: Sequence[Any], first: int = 0, each: int = 1) -> None:
+    def __call__(self, kernel: wp.Kernel, n: int, arguments: Sequence[Any], first: int = 0, each: int = 1) -> None:
         """Launch over particles ``first`` … ``first + n − 1``, in ranges on several threads on the CPU.
 
         Or over blocks of ``each`` particles, numbered so.
@@ -132,7 +132,7 @@ class Launcher:
             with turn:
                 _together(self._commands(kernel, _ranges_on(self.device, n, each), arguments, first))
 
-    def once(self, kernel: Any, dim: int, arguments: Sequence[Any]) -> None:
+    def once(self, kernel: wp.Kernel, dim: int, arguments: Sequence[Any]) -> None:
         """Launch a kernel of ``dim`` threads, few, that has no such parameter, in one piece."""
         with turn:
             self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
@@ -142,7 +142,7 @@ class Launcher:
         self._recorded.clear()
 
     def _commands(
-        self, kernel: Any, ranges: tuple[tuple[int, int], ...], arguments: Sequence[Any], first: int | None
+        self, kernel: wp.Kernel, ranges: tuple[tuple[int, int], ...], arguments: Sequence[Any], first: int | None
     ) -> list[Any]:
         key = (kernel, ranges, first, *[a if isinstance(a, (int, float)) else id(a) for a in arguments])
         known = self._recorded.get(key)
@@ -154,7 +154,7 @@ class Launcher:
         return known[0]
 
 
-def launch(kernel: Any, n: int, arguments: Sequence[Any], device: Any, first: int = 0) -> None:
+def launch(kernel: wp.Kernel, n: int, arguments: Sequence[Any], device: wp.DeviceLike, first: int = 0) -> None:
     """Launch as a ``Launcher`` does, once, for arguments that will not come again."""
     device = wp.get_device(device)
     if n:
@@ -163,7 +163,11 @@ def launch(kernel: Any, n: int, arguments: Sequence[Any], device: Any, first: in
 
 
 def _recorded(
-    kernel: Any, ranges: tuple[tuple[int, int], ...], arguments: Sequence[Any], first: int | None, device: Any
+    kernel: wp.Kernel,
+    ranges: tuple[tuple[int, int], ...],
+    arguments: Sequence[Any],
+    first: int | None,
+    device: wp.DeviceLike,
 ) -> list[Any]:
     lead = [[] if first is None else [first + begin] for begin, _ in ranges]
     return [
@@ -190,7 +194,7 @@ def _take(commands: Iterator[Any]) -> None:
         command.launch()
 
 
-def _ranges_on(device: Any, n: int, each: int = 1) -> tuple[tuple[int, int], ...]:
+def _ranges_on(device: wp.DeviceLike, n: int, each: int = 1) -> tuple[tuple[int, int], ...]:
     whole = not device.is_cpu or device.is_capturing  # a graph on the CPU runs on one thread
     return ((0, n),) if whole else _ranges(n, each)
 

@@ -1,8 +1,8 @@
 """The table of array fields, and the ``wp.struct`` types made from it.
 
 Every array that kernels share stands in one table below with its kind, unit and meaning; ``structure`` makes the Warp
-struct of a group and ``allocate`` its arrays, so that the table cannot drift from the code. Shapes: ``real`` (n,),
-``vec`` (n,) of (dim,), ``mat`` (n,) of (dim, dim); ``int`` (n,).
+struct of a group and ``allocate`` its arrays, so that the table cannot drift from the code; ``structs.py`` has the
+names for host code. Shapes: ``real`` (n,), ``vec`` (n,) of (dim,), ``mat`` (n,) of (dim, dim); ``int`` (n,).
 """
 
 import functools
@@ -58,6 +58,9 @@ FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
     "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
     "tie": Field("mat", "Pa", "share of Q that ties F to the positions (M16); empty where nothing is tied"),
+    "secant": Field("real", "-", "root of the secant stiffness in shear over the elastic one, of what is tied (M16)"),
+    "tied": Field("real", "J", "what the tie would hold more per root of the secant; empty where nothing tied yields"),
+    "slipped": Field("real", "J", "what the tie lost by yielding in the last step; empty where nothing tied yields"),
     "dissipated": Field("real", "J", "energy that the law dissipated in the last step; empty where none does"),
     "drag": Field(
         "mat", "Pa", "share of Q that is the dissipation's (M9); empty where its forces are all there is of it"
@@ -81,19 +84,19 @@ FORCES = {
 GROUPS = {"Particles": PARTICLES, "State": STATE, "Reference": REFERENCE, "Flux": FLUX, "Forces": FORCES}
 
 
-def element(space: Space, kind: str) -> Any:
+def element(space: Space, kind: str) -> type:
     """Warp type of one element of a field of this kind."""
     return {"real": space.real, "vec": space.vec, "mat": space.mat, "int": wp.int32}[kind]
 
 
 @functools.cache
-def structure(space: Space, group: str) -> Any:
+def structure(space: Space, group: str) -> type:
     """The ``wp.struct`` of a group of fields."""
     annotations = {name: wp.array(dtype=element(space, field.kind)) for name, field in GROUPS[group].items()}
     return wp.struct(type(group, (), {"__annotations__": annotations, "__module__": __name__}))
 
 
-def allocate(space: Space, group: str, n: int, device: Any, empty: Collection[str] = ()) -> Any:
+def allocate(space: Space, group: str, n: int, device: wp.DeviceLike, empty: Collection[str] = ()) -> Any:
     """An instance of a group's struct with zeroed arrays of ``n`` particles, of none where the name is in ``empty``."""
     fields = structure(space, group)()
     for name, field in GROUPS[group].items():
@@ -125,7 +128,7 @@ def part_of(array: wp.array, span: range) -> wp.array:
 
 
 @functools.cache
-def neighbour_structure(space: Space) -> Any:
+def neighbour_structure(space: Space) -> type:
     """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.
 
     ``w`` is V_b g_ab [1/m²] with g_ab = −W'(r)/r, so that V_b ∇W_ab = w_ab (x_b − x_a). M3 and M4 take ``own``, M5 the
@@ -145,7 +148,7 @@ def neighbour_structure(space: Space) -> Any:
 
 
 @functools.cache
-def clock_structure(space: Space) -> Any:
+def clock_structure(space: Space) -> type:
     """Time on the device, so that a recorded step stays valid: arrays of one element.
 
     ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``longest_dt`` [s] the

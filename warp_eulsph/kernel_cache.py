@@ -32,7 +32,7 @@ def rebuild_damaged() -> None:
 
 def _rebuilding(load: Any) -> Any:
     @functools.wraps(load)
-    def rebuilding(module: Any, device: Any, block_dim: int | None = None, *more: Any, **options: Any) -> Any:
+    def rebuilding(module: Any, device: wp.DeviceLike, block_dim: int | None = None, *more: Any, **options: Any) -> Any:
         try:
             return load(module, device, block_dim, *more, **options)
         except Exception as error:  # of no kind of its own

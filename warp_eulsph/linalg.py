@@ -1,7 +1,6 @@
 """Small dense matrices in 1-D, 2-D and 3-D as ``wp.func`` (Warp has no 1×1 determinant or inverse)."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -9,7 +8,7 @@ from .space import Space
 
 
 @functools.cache
-def det(space: Space) -> Any:
+def det(space: Space) -> wp.Function:
     """``wp.func`` det(A)."""
     real, mat = space.real, space.mat
 
@@ -29,7 +28,7 @@ def det(space: Space) -> Any:
 
 
 @functools.cache
-def inverse(space: Space) -> Any:
+def inverse(space: Space) -> wp.Function:
     """``wp.func`` A⁻¹."""
     real, mat = space.real, space.mat
 
@@ -49,7 +48,7 @@ def inverse(space: Space) -> Any:
 
 
 @functools.cache
-def reciprocal_cube_root(real: type) -> Any:
+def reciprocal_cube_root(real: type) -> wp.Function:
     """``wp.func`` x^(−1/3), NaN unless x > 0.
 
     On the CPU from a guess by the bits of x, 3 % off, twice y ← y (1 − c)^(−1/3), c = 1 − x y³, to third order in c;
@@ -83,7 +82,7 @@ def reciprocal_cube_root(real: type) -> Any:
 
 
 @functools.cache
-def stretch_of_volume(space: Space) -> Any:
+def stretch_of_volume(space: Space) -> wp.Function:
     """``wp.func`` J^(1/d), the stretch that alike in all directions makes the volume ratio J; 0 unless J > 0."""
     real, dim, root = space.real, space.dim, reciprocal_cube_root(space.real)
 
@@ -100,7 +99,7 @@ def stretch_of_volume(space: Space) -> Any:
 
 
 @functools.cache
-def cofactor(space: Space) -> Any:
+def cofactor(space: Space) -> wp.Function:
     """``wp.func`` cof(A) = det(A) A⁻ᵀ, defined for singular A too; maps area vectors (Nanson)."""
     real, mat = space.real, space.mat
 
@@ -133,7 +132,7 @@ def cofactor(space: Space) -> Any:
 
 
 @functools.cache
-def symmetric_bounds(space: Space) -> Any:
+def symmetric_bounds(space: Space) -> wp.Function:
     """``wp.func`` bounds (least, largest) of the eigenvalues of a symmetric matrix.
 
     Wolkowicz & Styan (1980): mean ∓ deviation·√(d−1); exact in 1-D and 2-D, and for equal eigenvalues.
@@ -152,7 +151,7 @@ def symmetric_bounds(space: Space) -> Any:
 
 
 @functools.cache
-def spread_of_invariants(space: Space) -> Any:
+def spread_of_invariants(space: Space) -> wp.Function:
     """``wp.func`` deviation·√(d−1) of the eigenvalues of A Aᵀ, as in ``symmetric_bounds``, from |A|² and |cof A|²."""
     real = space.real
     if space.dim == 1:
@@ -176,7 +175,7 @@ def spread_of_invariants(space: Space) -> Any:
 
 
 @functools.cache
-def stretch_bounds(space: Space) -> Any:
+def stretch_bounds(space: Space) -> wp.Function:
     """``wp.func`` bounds (least, largest) of the squared principal stretches of A, the eigenvalues of A Aᵀ.
 
     Those of ``symmetric_bounds``, from the invariants of the product instead of the product.
@@ -195,7 +194,7 @@ def stretch_bounds(space: Space) -> Any:
 
 
 @functools.cache
-def largest_shortening(space: Space) -> Any:
+def largest_shortening(space: Space) -> wp.Function:
     """``wp.func`` bound of the largest squared principal stretch of A⁻¹, without the inverse."""
     real, mat, share = space.real, space.mat, 1.0 / space.dim
     determinant, cof, spread_of = det(space), cofactor(space), spread_of_invariants(space)
@@ -212,7 +211,7 @@ def largest_shortening(space: Space) -> Any:
 
 
 @functools.cache
-def symmetric_eigen(space: Space) -> Any:
+def symmetric_eigen(space: Space) -> wp.Function:
     """``wp.func`` (A) -> (eigenvectors as columns, eigenvalues) by cyclic Jacobi rotations."""
     dim, real, mat, vec = space.dim, space.real, space.mat, space.vec
     sweeps = 8 if dim > 1 else 0  # Jacobi converges quadratically: 3×3 matrices reach round-off in 4 to 6 sweeps

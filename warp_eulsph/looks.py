@@ -3,12 +3,18 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import warp as wp
 
+from .structs import ParticleArrays
 from .summary import Rows, as_html, as_text, extent
 from .turns import in_turn
 
 if TYPE_CHECKING:
+    from .body import Body
+    from .boundaries import Boundary
+    from .interactions import Interaction
     from .order import Order
+    from .scheme.stepper import Stepper
     from .space import Space
 
 #: Forces of ``fields.FORCES`` that move a particle, those of the conditions among them.
@@ -19,14 +25,14 @@ ALL_FORCES = ("internal", "correction", "tie", "dissipation", "external", "react
 class Looks:
     """Fields of a ``Simulation`` in the order of the bodies' particles, copies on the host, and how it is shown."""
 
-    bodies: list[Any]
-    boundaries: tuple[Any, ...]
-    interactions: tuple[Any, ...]
+    bodies: "list[Body]"
+    boundaries: "tuple[Boundary, ...]"
+    interactions: "tuple[Interaction, ...]"
     space: "Space"
     order: "Order"
-    device: Any
-    stepper: Any
-    particles: Any
+    device: wp.Device
+    stepper: "Stepper"
+    particles: ParticleArrays
 
     if TYPE_CHECKING:
 

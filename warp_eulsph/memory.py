@@ -15,8 +15,11 @@ from .space import Space
 
 log = logging.getLogger(__name__)
 
+# What only laws with a history have
+_OF_YIELDING = ("Flux.dissipated", "Flux.secant", "Flux.tied", "Flux.slipped")
 
-def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n: float = math.inf) -> float:
+
+def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.DeviceLike, n: float = math.inf) -> float:
     """About what the default scheme allocates per particle, inside a body.
 
     Args:
@@ -29,7 +32,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
     """
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
-    absent = {"Forces.correction", "Forces.external", "Flux.drag"} | ({"Flux.Pi"} if vectors else set())
+    absent = {"Forces.correction", "Forces.external", "Flux.drag", *_OF_YIELDING} | ({"Flux.Pi"} if vectors else set())
     moved = {"Reference.resolution", "Reference.moment", "Flux.tie", "Forces.tie"}
     absent |= moved if moving else {"Reference.F", "Reference.balanced"}
     present = [
@@ -52,7 +55,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: Any, n:
     return reals * item + 4 * ints + 8 * doubles + neighbours * ((4 + item) * 1.25 if moving else 4 + 2 * item)
 
 
-def available(device: Any) -> int | None:
+def available(device: wp.DeviceLike) -> int | None:
     """Bytes that can be allocated on the device, None where the system does not say.
 
     On the CPU what the machine has left, or the memory group of this process (as of a container or a batch job).
@@ -109,7 +112,7 @@ def check_room(count: float, reals: float, who: str) -> None:
         )
 
 
-def check_memory(space: Space, media: Sequence[tuple[int, float, bool]], device: Any) -> None:
+def check_memory(space: Space, media: Sequence[tuple[int, float, bool]], device: wp.DeviceLike) -> None:
     """Log what media will take; raise MemoryError if that is more than there is.
 
     Args:

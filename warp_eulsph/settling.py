@@ -3,11 +3,12 @@
 import logging
 import math
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from .boundaries import Boundary, Damping
+from .scheme.stepper import Stepper
 
 log = logging.getLogger(__name__)
 
@@ -18,7 +19,7 @@ STEPS_BETWEEN_LOOKS = 20
 class Damped(Protocol):
     """What is asked of a simulation."""
 
-    stepper: Any
+    stepper: Stepper
 
     @property
     def boundaries(self) -> Sequence[Boundary]:
@@ -59,7 +60,7 @@ def _sum_of_lengths(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(vectors, axis=1).sum())
 
 
-def check_damped(simulation: Any) -> None:
+def check_damped(simulation: object) -> None:
     """Raise ValueError unless a condition damps, without which nothing comes to rest."""
     if not any(isinstance(boundary, Damping) for boundary in getattr(simulation, "boundaries", ())):
         raise ValueError("settle needs a Damping() among the boundaries, or motion goes on")

@@ -6,7 +6,6 @@ vectors of two rows, those of k + i and k + i + 4. Sums run in the order of the 
 """
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -16,7 +15,7 @@ LANES = 4  # of a row
 ALIGNMENT = 64  # bytes, a cache line
 
 
-def packed_rows(space: Space, n: int, vectors: int, device: Any) -> wp.array:
+def packed_rows(space: Space, n: int, vectors: int, device: wp.DeviceLike) -> wp.array:
     """Zeroed rows of ``vectors`` times four reals for ``n`` particles, (n, 4 · vectors), on a cache line's boundary."""
     size, item = n * vectors * LANES, wp.types.type_size_in_bytes(space.real)
     room = wp.zeros(size + ALIGNMENT // item, dtype=space.real, device=device)
@@ -87,6 +86,9 @@ def prelude(space: Space) -> str:
     typedef T Q __attribute__((ext_vector_type(4)));
     typedef T V __attribute__((ext_vector_type(8)));
     constexpr int dim = {space.dim};
+    // has the stack frame aligned, which clang does not by itself: spilled vectors that cross lines cost up to half
+    alignas({ALIGNMENT}) volatile char aligned[{ALIGNMENT}];
+    aligned[0] = 0;
     {_SHUFFLES}
     {image}
     // dim reals, then zeros

@@ -81,7 +81,7 @@ class Simulation(Looks):
         dilation: float = 1.3,
         periodic: Sequence[float] | None = None,
         dtype: type = wp.float64,
-        device: Any = None,
+        device: wp.DeviceLike = None,
         sort: bool = True,
     ):
         self.bodies = checked_bodies(objects(bodies, Body, "bodies", "Body(...)"))

@@ -3,7 +3,6 @@
 import functools
 import logging
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -32,7 +31,7 @@ SHORT_ROWS = 0.25
 
 
 @functools.cache
-def _make_count_parted(space: Space) -> Any:
+def _make_count_parted(space: Space) -> wp.Kernel:
     """Kernel of ``SumOfParticles``: how many particles are far from the one before them, if it is of the same body."""
     real, vec, separation = space.real, space.vec, difference(space)
     Particles, Reference, spacing_of = (

@@ -2,20 +2,19 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
 
 
 @functools.cache
-def vector_type(length: int, real: type) -> Any:
+def vector_type(length: int, real: type) -> type:
     """Warp vector type of ``length`` components; cached, because Warp makes a new class per call."""
     return wp.types.vector(length=length, dtype=real)
 
 
 @functools.cache
-def matrix_type(rows: int, columns: int, real: type) -> Any:
+def matrix_type(rows: int, columns: int, real: type) -> type:
     """Warp matrix type; cached, because Warp makes a new class per call."""
     return wp.types.matrix(shape=(rows, columns), dtype=real)
 
@@ -41,31 +40,31 @@ class Space:
             raise ValueError(f"real must be wp.float32 or wp.float64, got {self.real}")
 
     @property
-    def vec(self) -> Any:
+    def vec(self) -> type:
         """Vector of ``dim`` reals."""
         return vector_type(self.dim, self.real)
 
     @property
-    def mat(self) -> Any:
+    def mat(self) -> type:
         """Matrix of ``dim`` × ``dim`` reals."""
         return matrix_type(self.dim, self.dim, self.real)
 
-    def row(self, components: int) -> Any:
+    def row(self, components: int) -> type:
         """Row of ``components`` reals, the value of a field in an operator."""
         return vector_type(components, self.real)
 
-    def row_gradient(self, components: int) -> Any:
+    def row_gradient(self, components: int) -> type:
         """Gradient of a row: ``components`` × ``dim`` reals."""
         return matrix_type(components, self.dim, self.real)
 
     @property
-    def numpy(self) -> Any:
+    def numpy(self) -> type:
         """The numpy scalar type of ``real``."""
         return np.float32 if self.real is wp.float32 else np.float64
 
 
 @functools.cache
-def difference(space: Space) -> Any:
+def difference(space: Space) -> wp.Function:
     """``wp.func`` (to, from, box) -> to − from, nearest image where the box length is positive."""
     real, vec = space.real, space.vec
 

@@ -15,7 +15,7 @@ ROWS = 4096  # elements of the triad that one thread index does
 
 
 @functools.cache
-def _make_triad(real: type) -> Any:
+def _make_triad(real: type) -> wp.Kernel:
     @wp.func_native(f"for (int i = a * {ROWS}; i < (a + 1) * {ROWS}; ++i) x.data[i] = y.data[i] + s * z.data[i];")
     def rows(a: int, s: real, x: wp.array(dtype=real), y: wp.array(dtype=real), z: wp.array(dtype=real)): ...
 
@@ -27,7 +27,7 @@ def _make_triad(real: type) -> Any:
 
 
 @functools.cache
-def _make_multiply_add(real: type) -> Any:
+def _make_multiply_add(real: type) -> wp.Kernel:
     name = "double" if real is wp.float64 else "float"
     lanes = 64 // wp.types.type_size_in_bytes(real)
 

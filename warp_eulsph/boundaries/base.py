@@ -12,6 +12,7 @@ import warp as wp
 from ..checks import real_array
 from ..order import Order
 from ..space import Space
+from ..structs import ClockArrays, ForceArrays, ParticleArrays, StateArrays
 
 #: A predicate of initial positions (n, dim) -> (n,) bool, a boolean mask (n,), or an array of indices; rows of values
 #: are for the particles in its order.
@@ -33,9 +34,9 @@ class Assembly:
     """
 
     space: Space
-    device: Any
+    device: wp.Device
     X: np.ndarray
-    particles: Any
+    particles: ParticleArrays
     bodies: dict[str, range]
     order: Order
     surface_given: bool = False
@@ -146,11 +147,14 @@ class Bound:
             repeat them.
         sortable: whether particles may be sorted in memory: it finds them by arrays of ``Assembly.order.places_of``,
             what it holds for all of them comes from ``Assembly.order.carry``, the rest goes by ``indices``.
+        steady: whether ``impose`` sets velocities only, by a rule that is the same at all times and places, and linear:
+            of two velocities that obey it the mean does too. Then a step takes one velocity gradient instead of two.
     """
 
     indices: np.ndarray
     recordable: bool = False
     sortable: bool = False
+    steady: bool = False
 
     @property
     def loads(self) -> bool:
@@ -172,19 +176,19 @@ class Bound:
         """Whether ``limit`` asks for a shorter step."""
         return type(self).limit is not Bound.limit
 
-    def start(self, state: Any) -> None:
+    def start(self, state: StateArrays) -> None:
         """Prepare from the initial state, surface vectors included; called once."""
 
-    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+    def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         """Change velocities ``state.v`` (of ghosts also ``F`` and ``x``) to their values at time t + fraction · Δt."""
 
-    def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
+    def load(self, state: StateArrays, clock: ClockArrays, fraction: float, external: wp.array) -> None:
         """Add forces [N] at time t + fraction · Δt to ``external``."""
 
-    def damp(self, state: Any, clock: Any, forces: Any) -> None:
+    def damp(self, state: StateArrays, clock: ClockArrays, forces: ForceArrays) -> None:
         """Add forces [N] that damp motion to both ``forces.external`` and ``forces.damping``; comes after ``load``."""
 
-    def limit(self, state: Any, clock: Any) -> None:
+    def limit(self, state: StateArrays, clock: ClockArrays) -> None:
         """Ask for a shorter step, before it is chosen, for what ``load`` may do in it.
 
         Raise ``clock.frequency[0]`` to the highest angular frequency [1/s] of a particle under these forces alone:

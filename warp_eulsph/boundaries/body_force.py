@@ -8,6 +8,7 @@ import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region
 from .value import Value
 
@@ -33,7 +34,7 @@ class BodyForce(Boundary):
 
 
 @functools.cache
-def _make_load(space: Space) -> Any:
+def _make_load(space: Space) -> wp.Kernel:
     real, vec = space.real, space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -68,7 +69,7 @@ class BoundBodyForce(Bound):
         if condition.material:
             self.X = assembly.order.carry(assembly.X, self.space.vec)
 
-    def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
+    def load(self, state: StateArrays, clock: ClockArrays, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x if self.X is None else self.X, clock, fraction)
         arguments = [self.values.places, values, self.mass, external]
         self._launch(_make_load(self.space), len(self.indices), arguments)

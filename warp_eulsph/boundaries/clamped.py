@@ -3,13 +3,13 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region, unit_vector
 from .face import faces_along
 from .outermost import DEPTH
@@ -50,7 +50,7 @@ class Clamped(Boundary):
 
 
 @functools.cache
-def _make_hold(space: Space) -> Any:
+def _make_hold(space: Space) -> wp.Kernel:
     """Kernel: takes Σ c_a v_a of a column off its velocities by the least change in kinetic energy."""
     real, vec = space.real, space.vec
 
@@ -81,6 +81,7 @@ class BoundClamped(Bound):
 
     recordable = True
     sortable = True
+    steady = True
 
     def __init__(self, condition: Clamped, assembly: Assembly):
         self.condition, self.assembly = condition, assembly
@@ -114,7 +115,7 @@ class BoundClamped(Bound):
         self._start: wp.array | None = None
         self.indices = np.union1d(self._tops, np.flatnonzero(deep)).astype(np.int32)
 
-    def start(self, state: Any) -> None:
+    def start(self, state: StateArrays) -> None:
         face = faces_along(self.assembly, state, self._tops, self.condition.body, self.normal, "Clamped")
         order = np.lexsort((face.members, face.columns))
         members, columns, areas = face.members[order], face.columns[order], face.areas[order]
@@ -125,11 +126,14 @@ class BoundClamped(Bound):
         self._start = wp.array(np.searchsorted(columns, np.arange(count + 1)), dtype=wp.int32, device=self.device)
         self._places = self.assembly.order.places_of(members.astype(np.int32))
         self._weights = wp.array(weights, dtype=self.space.real, device=self.device)
-        self.impose(state, None, 0.0)
+        self._hold(state.v)
 
-    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+    def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
+        self._hold(state.v)
+
+    def _hold(self, v: wp.array) -> None:
         if self._start is not None:  # initial velocities are imposed before area vectors are known, and again after
-            arguments = [self._start, self._places, self._weights, self.mass, state.v]
+            arguments = [self._start, self._places, self._weights, self.mass, v]
             self._launch(_make_hold(self.space), len(self._start) - 1, arguments)
 
 

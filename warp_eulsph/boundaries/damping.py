@@ -2,7 +2,6 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -11,6 +10,7 @@ from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..reduce import SumOfParticles
 from ..space import Space, vector_type
+from ..structs import ClockArrays, ForceArrays, StateArrays
 from .base import Assembly, Bound, Boundary
 
 # Most of its velocity that a particle loses in a step. With c Δt of this the stable step of (M14), from
@@ -50,7 +50,7 @@ class Damping(Boundary):
 
 
 @functools.cache
-def _make_quotient(space: Space) -> Any:
+def _make_quotient(space: Space) -> wp.Kernel:
     """Kernel of ``SumOfParticles``: −Δx·Δf and m Δx² since the last call, f the forces of the material."""
     vec, Particles, State, Forces = space.vec, *(structure(space, name) for name in ("Particles", "State", "Forces"))
     precise, pair = vector_type(space.dim, wp.float64), wp.vec2d
@@ -83,7 +83,7 @@ def _make_quotient(space: Space) -> Any:
 
 
 @functools.cache
-def _make_follow() -> Any:
+def _make_follow() -> wp.Kernel:
     """Kernel: c = 2 ω, as it was where nothing moves."""
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -95,7 +95,7 @@ def _make_follow() -> Any:
 
 
 @functools.cache
-def _make_damp(space: Space) -> Any:
+def _make_damp(space: Space) -> wp.Kernel:
     real, Particles, State, Forces = space.real, *(structure(space, name) for name in ("Particles", "State", "Forces"))
     Clock = clock_structure(space)
 
@@ -139,11 +139,11 @@ class BoundDamping(Bound):
         self._sums = wp.zeros(1, dtype=wp.vec2d, device=self.device)
         self._sum = SumOfParticles(wp.vec2d, n, self.device)
 
-    def start(self, state: Any) -> None:
+    def start(self, state: StateArrays) -> None:
         if self.follows:
             wp.copy(self._x, state.x[self._places].contiguous())
 
-    def damp(self, state: Any, clock: Any, forces: Any) -> None:
+    def damp(self, state: StateArrays, clock: ClockArrays, forces: ForceArrays) -> None:
         if self.follows:
             arguments = [self._places, self.particles, state, forces, self._x, self._f]
             self._sum(_make_quotient(self.space), arguments, self._sums)

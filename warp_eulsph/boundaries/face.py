@@ -2,10 +2,10 @@
 
 import logging
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 
+from ..structs import StateArrays
 from .base import Assembly
 from .outermost import Surface, along, along_and_beside, column, nearest, outermost, pairs, surface_particles
 
@@ -235,7 +235,7 @@ def row(n: np.ndarray) -> str:
 
 
 def surfaces_held(
-    assembly: Assembly, state: Any, indices: np.ndarray, body: str | None
+    assembly: Assembly, state: StateArrays, indices: np.ndarray, body: str | None
 ) -> list[tuple[range, Surface, np.ndarray]]:
     """The bodies of which ``indices`` hold particles: their particles, surface, and which of them are held, (n,) bool.
 
@@ -258,7 +258,9 @@ def surfaces_held(
     ]
 
 
-def faces_along(assembly: Assembly, state: Any, indices: np.ndarray, body: str | None, n: np.ndarray, who: str) -> Face:
+def faces_along(
+    assembly: Assembly, state: StateArrays, indices: np.ndarray, body: str | None, n: np.ndarray, who: str
+) -> Face:
     """The faces along ``n`` of all bodies of which ``indices`` hold outermost particles, by numbers of particles.
 
     Raises:

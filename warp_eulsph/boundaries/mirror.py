@@ -12,6 +12,7 @@ from ..checks import real_array
 from ..execution import Launcher
 from ..fields import structure
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, unit_vector
 
 
@@ -125,7 +126,7 @@ def _fields(body: Any) -> list[tuple[str, np.ndarray]]:
 
 
 @functools.cache
-def _make_reflect(space: Space, odd: bool) -> Any:
+def _make_reflect(space: Space, odd: bool) -> wp.Kernel:
     real, vec, State = space.real, space.vec, structure(space, "State")
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -174,6 +175,6 @@ class BoundMirrorGhosts(Bound):
         assembly.particles.share.assign(share)
         self._plane = [self.space.vec(*condition.point), self.space.vec(*condition.normal)]
 
-    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+    def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         arguments = [self._sources, self._ghosts, self._X, *self._plane, state]
         self._launch(_make_reflect(self.space, self.image.odd), len(self.indices), arguments)

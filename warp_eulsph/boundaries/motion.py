@@ -10,6 +10,7 @@ import warp as wp
 from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region
 from .value import Value
 
@@ -37,7 +38,7 @@ class Motion(Boundary):
 
 
 @functools.cache
-def _make_impose(space: Space) -> Any:
+def _make_impose(space: Space) -> wp.Kernel:
     real, vec = space.real, space.vec
     Clock = clock_structure(space)
 
@@ -78,7 +79,7 @@ class BoundMotion(Bound):
         )
         self.recordable = self.before.recordable
 
-    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+    def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         before = self.before.at(self.X, clock, fraction - 0.5)
         after = self.after.at(self.X, clock, fraction + 0.5)
         arguments = [self.before.places, before, after, clock, state.v]

@@ -12,6 +12,7 @@ from ..execution import Launcher
 from ..fields import structure
 from ..linalg import cofactor
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region, rows_of, unit_vector
 from .face import faces_along, surfaces_held
 from .named_surface import find_surface
@@ -49,7 +50,7 @@ class Pressure(Boundary):
 
 
 @functools.cache
-def _make_load(space: Space) -> Any:
+def _make_load(space: Space) -> wp.Kernel:
     vec, one, State = space.vec, space.row(1), structure(space, "State")
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -68,7 +69,7 @@ def _make_load(space: Space) -> Any:
 
 
 @functools.cache
-def _make_load_face(space: Space) -> Any:
+def _make_load_face(space: Space) -> wp.Kernel:
     """Kernel: −p (c s_a + cof(F) r_a): the face's part of the area vector, c s_a and a rest r_a where faces meet."""
     real, vec, one, State, cof = space.real, space.vec, space.row(1), structure(space, "State"), cofactor(space)
 
@@ -104,7 +105,7 @@ class BoundPressure(Bound):
         self.values = Value(assembly, self.indices, 1, condition.value, who)
         self.recordable = self.values.recordable
 
-    def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
+    def load(self, state: StateArrays, clock: ClockArrays, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self.values.places, values, state, external]
         self._launch(_make_load(self.space), len(self.indices), arguments)
@@ -125,7 +126,7 @@ class BoundFacePressure(BoundPressure):
         if condition.normal is not None:
             self.normal = unit_vector(condition.normal, self.space.dim, "Pressure")
 
-    def start(self, state: Any) -> None:
+    def start(self, state: StateArrays) -> None:
         assembly = self.assembly
         if self.normal is not None:
             face = faces_along(assembly, state, self.indices, self.condition.body, self.normal, "Pressure")
@@ -147,7 +148,7 @@ class BoundFacePressure(BoundPressure):
         self._shares = wp.array(shares, dtype=self.space.real, device=self.device)
         self._rests = wp.array(rests, dtype=self.space.vec, device=self.device)
 
-    def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
+    def load(self, state: StateArrays, clock: ClockArrays, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self._places, self._rows, values, self._shares, self._rests, state, external]
         self._launch(_make_load_face(self.space), len(self.members), arguments)

@@ -3,12 +3,12 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region, unit_vector
 
 
@@ -31,7 +31,7 @@ class Roller(Boundary):
 
 
 @functools.cache
-def _make_impose(space: Space) -> Any:
+def _make_impose(space: Space) -> wp.Kernel:
     vec = space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -47,6 +47,7 @@ class BoundRoller(Bound):
 
     recordable = True
     sortable = True
+    steady = True
 
     def __init__(self, condition: Roller, assembly: Assembly):
         who = type(condition).__name__
@@ -56,6 +57,6 @@ class BoundRoller(Bound):
         self.indices = assembly.select(condition.region, condition.body, who)
         self._places = assembly.order.places_of(self.indices)
 
-    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+    def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         arguments = [self._places, self.space.vec(*self.normal), state.v]
         self._launch(_make_impose(self.space), len(self.indices), arguments)

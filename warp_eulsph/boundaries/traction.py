@@ -9,6 +9,7 @@ import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region, rows_of, unit_vector
 from .face import faces_along
 from .value import Value
@@ -44,7 +45,7 @@ class Traction(Boundary):
 
 
 @functools.cache
-def _make_load(space: Space) -> Any:
+def _make_load(space: Space) -> wp.Kernel:
     real, vec = space.real, space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -83,14 +84,14 @@ class BoundTraction(Bound):
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
         self.recordable = self.values.recordable
 
-    def start(self, state: Any) -> None:
+    def start(self, state: StateArrays) -> None:
         face = faces_along(self.assembly, state, self.indices, self.condition.body, self.normal, "Traction")
         self.face, self._places = face, self.assembly.order.places_of(face.members)
         rows = rows_of(self.indices, face.tops[face.columns])
         self._rows = wp.array(rows, dtype=wp.int32, device=self.device)
         self._areas = wp.array(face.areas, dtype=self.space.real, device=self.device)
 
-    def load(self, state: Any, clock: Any, fraction: float, external: wp.array) -> None:
+    def load(self, state: StateArrays, clock: ClockArrays, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self._places, self._rows, values, self._areas, external]
         self._launch(_make_load(self.space), len(self._places), arguments)

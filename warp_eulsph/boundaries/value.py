@@ -10,11 +10,12 @@ from ..checks import real_array, spread
 from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
+from ..structs import ClockArrays
 from .base import Assembly, check_takes, read_only
 
 
 @functools.cache
-def _make_evaluate(space: Space, components: int, function: Any) -> Any:
+def _make_evaluate(space: Space, components: int, function: Any) -> wp.Kernel:
     real, vec, value = space.real, space.vec, space.row(components)
     Clock = clock_structure(space)
 
@@ -49,12 +50,21 @@ class Value:
             ``wp.func`` (x, t) -> row, evaluated on the device; or a Python function (x (k, dim), t) -> any of these
             shapes, evaluated on the host each step (slower: it reads the device).
         who: named in errors.
+        places: rows of the arrays of positions that ``at`` gets, where those are not of all particles.
     """
 
-    def __init__(self, assembly: Assembly, indices: np.ndarray, components: int, given: Any, who: str):
+    def __init__(
+        self,
+        assembly: Assembly,
+        indices: np.ndarray,
+        components: int,
+        given: Any,
+        who: str,
+        places: wp.array | None = None,
+    ):
         self.space, self.device, self.components, self.who = assembly.space, assembly.device, components, who
         self.count, self._launch = len(indices), Launcher(assembly.device)
-        self.places = assembly.order.places_of(indices)
+        self.places = assembly.order.places_of(indices) if places is None else places
         self.rows = wp.zeros(len(indices), dtype=self.space.row(components), device=assembly.device)
         self.function = given if callable(given) else None
         self.on_device = isinstance(given, wp.Function)
@@ -71,7 +81,7 @@ class Value:
         """Whether the rows need no Python function."""
         return self.function is None or self.on_device
 
-    def at(self, x: wp.array, clock: Any, fraction: float) -> wp.array:
+    def at(self, x: wp.array, clock: ClockArrays, fraction: float) -> wp.array:
         """The rows at positions ``x`` [m] and time t + fraction · Δt, (k,)."""
         if self.on_device:
             kernel = _make_evaluate(self.space, self.components, self.function)

@@ -10,6 +10,7 @@ import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 from .base import Assembly, Bound, Boundary, Region
 from .value import Value
 
@@ -35,7 +36,7 @@ class Velocity(Boundary):
 
 
 @functools.cache
-def _make_impose(space: Space) -> Any:
+def _make_impose(space: Space) -> wp.Kernel:
     vec, dim = space.vec, space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -66,7 +67,7 @@ class BoundVelocity(Bound):
         self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
-        self.recordable = self.values.recordable
+        self.recordable, self.steady = self.values.recordable, self.values.function is None
         axes = range(self.space.dim) if condition.axes is None else condition.axes
         known = range(self.space.dim)
         if not isinstance(axes, Iterable):
@@ -75,7 +76,7 @@ class BoundVelocity(Bound):
             raise ValueError(f"{who}: axes must be among {list(known)}, got {condition.axes}")
         self.axes = wp.vec3i(*[int(i in axes) for i in range(3)])
 
-    def impose(self, state: Any, clock: Any, fraction: float) -> None:
+    def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         values = self.values.at(state.x, clock, fraction)
         arguments = [self.values.places, values, self.axes, state.v]
         self._launch(_make_impose(self.space), len(self.indices), arguments)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from os import PathLike
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -159,7 +158,7 @@ def _odd(x: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 @functools.cache
-def _make_crossings() -> Any:
+def _make_crossings() -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def crossings(
         first: int,

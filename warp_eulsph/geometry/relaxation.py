@@ -3,7 +3,6 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -68,7 +67,7 @@ class Relaxation:
 
 
 @functools.cache
-def _make_push() -> Any:
+def _make_push() -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def push(
         first: int,

@@ -4,7 +4,6 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -166,7 +165,7 @@ class Surface:
 
 
 @functools.cache
-def _make_query(winding: bool) -> Any:
+def _make_query(winding: bool) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def query(
         first: int,

@@ -1,7 +1,6 @@
 """The paper's smoothing (§4.2): the corrected average over the neighbours, the particle itself left out (M6)."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -14,7 +13,7 @@ from .values import corrected_value
 
 
 @functools.cache
-def make_average(weight: Weight, space: Space, components: int) -> Any:
+def make_average(weight: Weight, space: Space, components: int) -> wp.Kernel:
     """Kernel: S_a(f) = Σ_{b≠a} N_b(x_a) f_b / (1 − N_a(x_a)) with the corrections α, β of N (M6).
 
     The denominator is the share of the neighbours. It vanishes for linear values when all neighbours lie on one side

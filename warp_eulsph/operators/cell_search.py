@@ -1,7 +1,6 @@
 """The search for one particle's neighbours among particles sorted into cells (``cells.py``), eight at a time."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -188,7 +187,7 @@ _FILL = """
 
 
 @functools.cache
-def make_search(space: Space, fill: bool) -> Any:
+def make_search(space: Space, fill: bool) -> wp.Kernel:
     """Kernel: count a row's neighbours, or (``fill``) write them sorted by index."""
     real, vec = space.real, space.vec
     vec3 = wp.types.vector(length=3, dtype=real)

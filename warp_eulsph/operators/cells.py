@@ -5,7 +5,6 @@ axis they are contiguous, so that a particle looks at a few runs of candidates.
 """
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -23,7 +22,7 @@ CELLS_PER_SUPPORT = (1, 1, 3)
 
 
 @functools.cache
-def _make_frame(space: Space) -> Any:
+def _make_frame(space: Space) -> wp.Kernel:
     """Kernel of one thread: the box around the places, and cells that fill it.
 
     ``frame`` becomes (origin x, y, z; cells per metre along x, y, z; largest h), ``sides`` the number of cells along
@@ -109,7 +108,7 @@ def _make_frame(space: Space) -> Any:
 
 
 @functools.cache
-def _make_assign(space: Space) -> Any:
+def _make_assign(space: Space) -> wp.Kernel:
     """Kernel: the cell that each particle lies in."""
     real = space.real
     vec3 = wp.types.vector(length=3, dtype=real)
@@ -133,7 +132,7 @@ def _make_assign(space: Space) -> Any:
 
 
 @functools.cache
-def _make_sort() -> Any:
+def _make_sort() -> wp.Kernel:
     """Kernel of one thread: a stable counting sort; cell c holds ``order[begin[c]:begin[c+1]]``."""
 
     @wp.func_native("""
@@ -163,7 +162,7 @@ def _make_sort() -> Any:
 
 
 @functools.cache
-def _make_collect(space: Space) -> Any:
+def _make_collect(space: Space) -> wp.Kernel:
     """Kernel: place, smoothing length and body in the order of the cells, each in a row of its own."""
     real = space.real
     vec3 = wp.types.vector(length=3, dtype=real)
@@ -199,12 +198,12 @@ class Cells:
         device: the CPU.
     """
 
-    def __init__(self, space: Space, support: float, h: wp.array, body: wp.array, box: Any, device: Any):
+    def __init__(self, space: Space, support: float, h: wp.array, body: wp.array, box: wp.array, device: wp.DeviceLike):
         n = len(h)
         self.space, self.support, self.h, self.body, self.box, self.device = space, support, h, body, box, device
         self._launch = Launcher(device)
-        self._scratch: Any = None
-        self._room: Any = None
+        self._scratch: wp.array | None = None
+        self._room: wp.array | None = None
         self._stride = 0
         self._most = CELLS_PER_PARTICLE * n + 64
         self._frame = wp.zeros(7, dtype=space.real, device=device)

@@ -1,7 +1,6 @@
 """Pair weights and the gradient correction L_a = K_a⁻¹ (M3), with its fall-back for poor neighbourhoods."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -18,7 +17,7 @@ CUTOFF = 0.02
 
 
 @functools.cache
-def make_pair_sums(weight: Weight, space: Space) -> Any:
+def make_pair_sums(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: w_ab = V_b g_ab of every pair, its sum, K_a = Σ w ξ⊗ξ (M3, ξ = x_b − x_a) and the mass sum of M7."""
     real, mat = space.real, space.mat
     Particles, Reference, Neighbours = (
@@ -53,7 +52,7 @@ def make_pair_sums(weight: Weight, space: Space) -> Any:
 
 
 @functools.cache
-def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
+def make_pair_sums_simd(weight: Weight, space: Space) -> wp.Kernel:
     """SIMD kernel of ``make_pair_sums``."""
     real, vec, mat = space.real, space.vec, space.mat
     Particles, Reference, Neighbours = (
@@ -145,7 +144,7 @@ def make_pair_sums_simd(weight: Weight, space: Space) -> Any:
 
 
 @functools.cache
-def corrected_inverse(space: Space) -> Any:
+def corrected_inverse(space: Space) -> wp.Function:
     """``wp.func`` K⁻¹, the pseudo-inverse where an eigenvalue of K is below ``CUTOFF``."""
     real, mat, dim = space.real, space.mat, space.dim
     invert, bounds, eigen = inverse(space), symmetric_bounds(space), symmetric_eigen(space)
@@ -167,7 +166,7 @@ def corrected_inverse(space: Space) -> Any:
 
 
 @functools.cache
-def make_correct(space: Space) -> Any:
+def make_correct(space: Space) -> wp.Kernel:
     """Kernel: L_a from K_a (M3), which may be the same array; ``poor``: directions in which a particle fell back."""
     real, mat, dim = space.real, space.mat, space.dim
     Reference = structure(space, "Reference")

@@ -1,7 +1,6 @@
 """Dual divergence (M5): the exact adjoint of the corrected gradient."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -11,7 +10,7 @@ from .row_sums import flux_sum
 
 
 @functools.cache
-def make_divergence(space: Space, simd: bool = False) -> Any:
+def make_divergence(space: Space, simd: bool = False) -> wp.Kernel:
     """Kernel: −T_a = V_a Σ_b V_b g_ab (Π_a + Π_b) ξ with Π = Q Lᵀ (M5); sums to zero over all particles.
 
     ξ joins the balanced positions of the particles (M13), their positions where nothing is balanced.
@@ -31,7 +30,7 @@ def make_divergence(space: Space, simd: bool = False) -> Any:
 
 
 @functools.cache
-def make_tilted_divergence(space: Space) -> Any:
+def make_tilted_divergence(space: Space) -> wp.Kernel:
     """Kernel: −T_a = V_a Σ_b V_b g_ab (t_ab Π_a + t_ba Π_b) ξ, tilted (M17); its Σ t_ab w_ab ξ is known."""
     vec, mat = space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)

@@ -1,7 +1,6 @@
 """Corrected gradient (M4): exact for linear fields on any cloud, edges and corners included."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -11,7 +10,7 @@ from .row_sums import outer_sum
 
 
 @functools.cache
-def make_gradient(space: Space, components: int, simd: bool = False) -> Any:
+def make_gradient(space: Space, components: int, simd: bool = False) -> wp.Kernel:
     """Kernel: ∇f_a = Σ_b V_b g_ab (f_b − f_a) ⊗ ξ L_a, for rows f of ``components`` reals (M4).
 
     ξ joins the balanced positions of the particles (M13), their positions where nothing is balanced. ``simd`` has a

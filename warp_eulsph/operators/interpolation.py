@@ -1,13 +1,13 @@
 """The interpolation N spanned by corrected values, and its transpose (docs/method.md §5): N_b(x_a) = V_b W̃_b(x_a)."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
+from ..structs import NeighbourRows, ParticleArrays, ReferenceArrays
 from ..weights import Weight
 from ..weights.base import value
 from .average import make_average
@@ -15,7 +15,7 @@ from .values import Values, corrected_value, make_value_correction
 
 
 @functools.cache
-def make_interpolate(weight: Weight, space: Space, components: int, transpose: bool) -> Any:
+def make_interpolate(weight: Weight, space: Space, components: int, transpose: bool) -> wp.Kernel:
     """Kernel: (N f)_a = Σ_b N_b(x_a) f_b, or with ``transpose`` (Nᵀ f)_a = Σ_c N_a(x_c) f_c, a itself included."""
     real, vec, row = space.real, space.vec, space.row(components)
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -49,7 +49,7 @@ def make_interpolate(weight: Weight, space: Space, components: int, transpose: b
 
 
 @functools.cache
-def make_mass_diagonals(weight: Weight, space: Space) -> Any:
+def make_mass_diagonals(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: M^L_aa = Σ_c m_c N_a(x_c), lumped, and M^C_aa = Σ_c m_c N_a(x_c)², the diagonal of Nᵀ diag(m) N [kg]."""
     real, vec = space.real, space.vec
     Particles, Reference, Neighbours = (
@@ -103,7 +103,14 @@ class Interpolation:
     """
 
     def __init__(
-        self, values: Values, space: Space, weight: Weight, particles: Any, reference: Any, near: Any, device: Any
+        self,
+        values: Values,
+        space: Space,
+        weight: Weight,
+        particles: ParticleArrays,
+        reference: ReferenceArrays,
+        near: NeighbourRows,
+        device: wp.DeviceLike,
     ):
         n, self._launch = len(particles.mass), Launcher(device)
         self.values, self.space, self.weight, self.device = values, space, weight, device

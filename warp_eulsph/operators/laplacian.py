@@ -1,7 +1,6 @@
 """Graph Laplacian of the neighbour list, and conjugate gradients on it."""
 
 import functools
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -10,10 +9,11 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..reduce import Sum
 from ..space import Space
+from ..structs import NeighbourRows, ReferenceArrays
 
 
 @functools.cache
-def _make_apply(space: Space) -> Any:
+def _make_apply(space: Space) -> wp.Kernel:
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
 
@@ -44,7 +44,7 @@ def _make_apply(space: Space) -> Any:
 
 
 @functools.cache
-def safe_ratio(space: Space) -> Any:
+def safe_ratio(space: Space) -> wp.Function:
     """``wp.func`` component-wise n/d, zero where d is zero: a converged direction stops moving."""
     real, vec, dim = space.real, space.vec, space.dim
 
@@ -60,7 +60,7 @@ def safe_ratio(space: Space) -> Any:
 
 
 @functools.cache
-def _make_advance(space: Space, start: bool) -> Any:
+def _make_advance(space: Space, start: bool) -> wp.Kernel:
     """Kernel: x and residual along the search direction (or the first residual), preconditioned residual.
 
     At the start ``Ap`` becomes what round-off is measured against: the right-hand side, r∘r/diagonal, which a warm
@@ -113,7 +113,7 @@ def _make_advance(space: Space, start: bool) -> Any:
 
 
 @functools.cache
-def _make_turn(space: Space) -> Any:
+def _make_turn(space: Space) -> wp.Kernel:
     """Kernel: the next search direction."""
     vec = space.vec
     ratio = safe_ratio(space)
@@ -135,7 +135,7 @@ class LaplacianSolver:
     solution as the next first guess.
     """
 
-    def __init__(self, space: Space, n: int, device: Any):
+    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
         self.space, self.device, self._launch = space, device, Launcher(device)
         vector = functools.partial(wp.zeros, dtype=space.vec, device=device)
         self.psi, self.residual = vector(n), vector(n)
@@ -144,7 +144,7 @@ class LaplacianSolver:
         self._scale, self._rz, self._rz_old, self._pAp = vector(1), vector(1), vector(1), vector(1)
         self._sum = Sum(space.vec, n, device)
 
-    def solve(self, reference: Any, near: Any, body: range, iterations: int) -> None:
+    def solve(self, reference: ReferenceArrays, near: NeighbourRows, body: range, iterations: int) -> None:
         """Improve ``psi`` of one body's particles for the right-hand side in ``residual``, which becomes the residual.
 
         Bodies are solved one by one: step lengths shared between them would let one feel the other.
@@ -163,11 +163,11 @@ class LaplacianSolver:
             turn = [self._rz, self._rz_old, self._z, self._p]
             self._launch(_make_turn(self.space), len(body), turn, body.start)
 
-    def _apply(self, reference: Any, near: Any, body: range, f: wp.array) -> None:
+    def _apply(self, reference: ReferenceArrays, near: NeighbourRows, body: range, f: wp.array) -> None:
         arguments = [reference, near, f, self._Ap, self._diagonal, self._product]
         self._launch(_make_apply(self.space), len(body), arguments, body.start)
 
-    def _advance(self, reference: Any, body: range, start: bool) -> None:
+    def _advance(self, reference: ReferenceArrays, body: range, start: bool) -> None:
         scalars = [self._scale, self._rz, self._pAp]
         vectors = [self._Ap, self._p, self.psi, self.residual, self._z, self._product]
         arguments = [*scalars, reference.h, self._diagonal, *vectors]

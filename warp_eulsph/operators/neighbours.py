@@ -2,7 +2,7 @@
 
 import functools
 import logging
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import warp as wp
@@ -11,6 +11,7 @@ from ..atomics import raise_to
 from ..execution import Launcher, simd
 from ..fields import neighbour_structure
 from ..space import Space, difference, vector_type
+from ..structs import NeighbourRows
 from ..weights import Weight
 from .cells import Cells
 
@@ -23,7 +24,7 @@ MOST_PAIRS = 2**31 - 1
 
 
 @functools.cache
-def _make_pad(space: Space, first_component: int) -> Any:
+def _make_pad(space: Space, first_component: int) -> wp.Kernel:
     """Kernel: positions as components of 3-vectors from ``first_component`` on, wrapped into the periodic box."""
     real, vec, dim = space.real, space.vec, space.dim
     vec3 = wp.types.vector(length=3, dtype=real)
@@ -43,7 +44,7 @@ def _make_pad(space: Space, first_component: int) -> Any:
 
 
 @functools.cache
-def _make_search(space: Space, fill: bool) -> Any:
+def _make_search(space: Space, fill: bool) -> wp.Kernel:
     """Kernel: count a row's neighbours, or (``fill``) write them sorted by index."""
     real, vec, dim = space.real, space.vec, space.dim
     vec3 = wp.types.vector(length=3, dtype=real)
@@ -112,7 +113,7 @@ def _make_search(space: Space, fill: bool) -> Any:
 
 
 @functools.cache
-def _make_longest(space: Space) -> Any:
+def _make_longest(space: Space) -> wp.Kernel:
     """Kernel: the largest smoothing length."""
     real = space.real
     raise_longest = raise_to(real)
@@ -125,7 +126,7 @@ def _make_longest(space: Space) -> Any:
 
 
 @functools.cache
-def _make_check_room(space: Space) -> Any:
+def _make_check_room(space: Space) -> wp.Kernel:
     """Kernel of one thread: stop a running batch of steps where the host must act before the lists can be filled."""
     real, vec, dim = space.real, space.vec, space.dim
 
@@ -165,16 +166,23 @@ class NeighbourLists:
     """
 
     def __init__(
-        self, space: Space, weight: Weight, h: wp.array, body: wp.array, box: Any, device: Any, tilted: bool = False
+        self,
+        space: Space,
+        weight: Weight,
+        h: wp.array,
+        body: wp.array,
+        box: Sequence[float],
+        device: wp.DeviceLike,
+        tilted: bool = False,
     ):
         self.space, self.device, self._launch = space, device, Launcher(device)
         self.h, self.body, self.box, self._tilted = h, body, space.vec(*box), tilted
         n = len(h)
         self.support, self._in_cells = weight.support, simd(device)
         self.cells: Cells | None = None
-        self.grid: Any = None
+        self.grid: wp.HashGrid | None = None
         self._equip()
-        self.rows = neighbour_structure(space)()
+        self.rows: NeighbourRows = neighbour_structure(space)()
         self.rows.box = self.box
         self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
         self._waiting = wp.zeros(1, dtype=wp.int32, device=device)
@@ -248,7 +256,7 @@ class NeighbourLists:
         self._launch(_make_pad(self.space, last), n, [x, self.box, self.padded])
         if self.cells is not None:
             self.cells.sort(self.padded)
-        else:
+        elif self.grid is not None:
             if self._builds == 0:
                 self._measure()
             self.grid.build(self.padded, self.support * self._longest * QUERY_MARGIN, groups=self.body)
@@ -308,6 +316,7 @@ class NeighbourLists:
         if self.cells is not None:
             self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, self._scratch, fill)
             return
+        assert self.grid is not None  # one or the other is made
         arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self._h_max]
         arguments += [self.count, self.rows.start, self.rows.index]
         self._launch(_make_search(self.space, fill), len(x), arguments)

@@ -4,7 +4,6 @@ Each factory returns a ``wp.func`` of (a, near, …); with ``simd`` it is the SI
 """
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -14,7 +13,7 @@ from ..space import Space, difference
 
 
 @functools.cache
-def laplacian_sum(space: Space, simd: bool) -> Any:
+def laplacian_sum(space: Space, simd: bool) -> wp.Function:
     """``wp.func`` (a, near, f, diagonal) -> Σ_b w_ab (f_b − f_a), ``diagonal`` = Σ_b w_ab."""
     real, vec = space.real, space.vec
     Neighbours = neighbour_structure(space)
@@ -53,7 +52,7 @@ def laplacian_sum(space: Space, simd: bool) -> Any:
 
 
 @functools.cache
-def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
+def outer_sum(space: Space, simd: bool, of_positions: bool) -> wp.Function:
     """``wp.func`` (a, near, f, x) -> Σ_b w_ab (f_b − f_a) ⊗ (x_b − x_a) of two fields of ``vec``, x positions, own w.
 
     With ``of_positions`` f are positions too, whose differences take the nearest image in a periodic box.
@@ -121,7 +120,7 @@ def outer_sum(space: Space, simd: bool, of_positions: bool) -> Any:
 
 
 @functools.cache
-def flux_sum(space: Space, simd: bool) -> Any:
+def flux_sum(space: Space, simd: bool) -> wp.Function:
     """``wp.func`` (a, near, Q, x) -> Σ_b w_ab (Q_a + Q_b)(x_b − x_a) for a field of ``mat``."""
     real, vec, mat = space.real, space.vec, space.mat
     Neighbours = neighbour_structure(space)

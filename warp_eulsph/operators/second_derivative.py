@@ -1,7 +1,6 @@
 """Compact second derivative (Brookshaw 1985): it sees the saw-tooth that a gradient taken twice annihilates."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -10,7 +9,7 @@ from ..space import Space, difference
 
 
 @functools.cache
-def make_second_derivative(space: Space, components: int) -> Any:
+def make_second_derivative(space: Space, components: int) -> wp.Kernel:
     """Kernel: ∇²f_a = 2 Σ_b V_b g_ab (f_b − f_a − ∇f_a·ξ) / (tr K_a / d), for rows f of ``components`` reals.
 
     K_a is that of M3. Zero for linear fields, at boundaries too; all pairs count with the same sign, so that no

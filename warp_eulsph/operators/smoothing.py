@@ -1,7 +1,6 @@
 """Smoothing that reproduces linear fields everywhere and keeps mass-weighted sums (M7)."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -10,7 +9,7 @@ from ..space import Space, difference
 
 
 @functools.cache
-def make_linear_exact(space: Space, components: int) -> Any:
+def make_linear_exact(space: Space, components: int) -> wp.Kernel:
     """Kernel: S_a(f) = f_a + θ Σ_b ω_ab [f_b − f_a − ½(∇f_a + ∇f_b) ξ], ω_ab = m_b g_ab / max(row_a, row_b) (M7).
 
     m_a ω_ab is symmetric, hence Σ m_a S_a(f) = Σ m_a f_a to round-off.

@@ -3,7 +3,7 @@
 import functools
 from abc import ABC
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import warp as wp
 
@@ -36,7 +36,7 @@ class Linear(Values):
 
 
 @functools.cache
-def make_value_correction(weight: Weight, space: Space, linear: bool) -> Any:
+def make_value_correction(weight: Weight, space: Space, linear: bool) -> wp.Kernel:
     """Kernel: α_a [-] and β_a [1/m] such that Σ_b V_b W̃_b(x_a) (1, x_a − x_b) = (1, 0); β = 0 unless ``linear``.
 
     With the moments M_k = Σ_b V_b W_ab (x_a − x_b)^⊗k: β = −M_2⁻¹ M_1, α = 1/(M_0 + β·M_1), which is positive.
@@ -78,7 +78,7 @@ def make_value_correction(weight: Weight, space: Space, linear: bool) -> Any:
 
 
 @functools.cache
-def corrected_value(space: Space) -> Any:
+def corrected_value(space: Space) -> wp.Function:
     """``wp.func`` W̃_b(x_c) = α_c (1 + β_c·(x_c − x_b)) W_cb [1/m^d]."""
     real, vec = space.real, space.vec
 

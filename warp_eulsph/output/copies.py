@@ -71,7 +71,7 @@ class Copy:
 class Copies:
     """Makes copies of arrays of one device; pinned memory is used again, because to allocate it halts the device."""
 
-    def __init__(self, device: Any):
+    def __init__(self, device: wp.DeviceLike):
         self.device = wp.get_device(device)
         self._stream = wp.Stream(self.device) if self.device.is_cuda else None
         self._free: defaultdict[tuple[Any, ...], list[wp.array]] = defaultdict(list)

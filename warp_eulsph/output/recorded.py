@@ -6,10 +6,20 @@ from typing import Any, Protocol, TypeGuard
 import numpy as np
 import warp as wp
 
-from ..boundaries import Boundary
+from ..body import Body
+from ..boundaries import Bound, Boundary
+from ..building import Options
+from ..diagnostics import Diagnostics
+from ..interactions import BoundInteraction, Interaction
 from ..order import Order
+from ..scheme.arrangement import Arrangement
+from ..scheme.policy import ReferencePolicy
 from ..scheme.reference import Configuration
+from ..scheme.stepper import Stepper
+from ..scheme.time_step import DeviceClock
+from ..sorting import Sorting
 from ..space import Space
+from ..structs import ParticleArrays
 from ..whole import Whole
 
 
@@ -23,8 +33,8 @@ class Recorded(Protocol):
     """
 
     space: Space
-    device: Any
-    particles: Any
+    device: wp.Device
+    particles: ParticleArrays
     ranges: dict[str, range]
     order: Order
     whole: Whole
@@ -67,18 +77,18 @@ class Recorded(Protocol):
 class RecordedSolids(Recorded, Protocol):
     """Bodies that deform under conditions."""
 
-    stepper: Any
-    clock: Any
-    diagnostics: Any
-    sorting: Any
-    bodies: Any
+    stepper: Stepper
+    clock: DeviceClock
+    diagnostics: Diagnostics
+    sorting: Sorting
+    bodies: list[Body]
     boundaries: tuple[Boundary, ...]
-    conditions: Any
-    interactions: Any
-    bound_interactions: Any
-    options: Any
-    reference: Any
-    arrangement: Any
+    conditions: list[Bound]
+    interactions: tuple[Interaction, ...]
+    bound_interactions: list[BoundInteraction]
+    options: Options
+    reference: ReferencePolicy
+    arrangement: Arrangement
     dilation: float
 
     def energy(self) -> dict[str, float]:

@@ -4,7 +4,6 @@ import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -148,7 +147,7 @@ def _unfolded(
 
 
 @functools.cache
-def _make_weigh(weight: Weight, space: Space) -> Any:
+def _make_weigh(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: W(r, h) of each distance."""
     real, W_of = space.real, value(weight, space)
 

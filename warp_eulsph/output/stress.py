@@ -1,7 +1,6 @@
 """Cauchy stress of a state, all nine components in any dimension."""
 
 import functools
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -15,7 +14,7 @@ from .recorded import RecordedSolids
 
 
 @functools.cache
-def _make_cauchy(space: Space, full: Space, law: Law) -> Any:
+def _make_cauchy(space: Space, full: Space, law: Law) -> wp.Kernel:
     """Kernel: σ of F in the space of the simulation, by a law in ``full`` dimensions with missing stretches of one."""
     real, mat, Constants = space.real, space.mat, law.Constants
     mat33, dim, full_dim, full_mat = matrix_type(3, 3, space.real), space.dim, full.dim, full.mat
@@ -66,7 +65,7 @@ def body_stress(space: Space, material: Material, body: range, F: wp.array, hist
     launch(kernel, len(body), [body.start, F, history, material.filled_constants(law), sigma], F.device, body.start)
 
 
-def stresses(space: Space, n: int, device: Any) -> wp.array:
+def stresses(space: Space, n: int, device: wp.DeviceLike) -> wp.array:
     """An array for ``n`` stresses of 3 × 3 reals."""
     return wp.empty(n, dtype=matrix_type(3, 3, space.real), device=device)
 

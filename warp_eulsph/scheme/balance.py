@@ -3,7 +3,6 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
@@ -12,6 +11,7 @@ from ..fields import neighbour_structure, structure
 from ..linalg import det, inverse
 from ..operators.row_sums import laplacian_sum, outer_sum
 from ..space import Space
+from ..structs import ParticleArrays, StateArrays
 from .dissipation import UpwindForces
 from .flux import Flux
 from .health import WELL
@@ -51,13 +51,13 @@ class Balance(Correction):
         if not (math.isfinite(self.bound) and 0.0 < self.bound <= 0.25):
             raise ValueError(f"bound must be in (0, 0.25] spacings, got {self.bound}; 0.25 is the tested value")
 
-    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "BalancedPairs":
+    def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "BalancedPairs":
         """Allocate."""
         return BalancedPairs(self, space, particles, device)
 
 
 @functools.cache
-def _make_renew(space: Space) -> Any:
+def _make_renew(space: Space) -> wp.Kernel:
     """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13).
 
     ``torn`` takes the place of the first particle with a new face.
@@ -88,7 +88,7 @@ def _make_renew(space: Space) -> Any:
 
 
 @functools.cache
-def _make_relax(space: Space, simd: bool, start: bool) -> Any:
+def _make_relax(space: Space, simd: bool, start: bool) -> wp.Kernel:
     """Kernel: one sweep of damped Jacobi on Σ_b ω_ab (ψ_a − ψ_b) = K_a d_a, ω_ab = V_a V_b g_ab (M13).
 
     K_a, because the force of shifted positions comes multiplied by L = K⁻¹. With ``start`` the sweep is the first, from
@@ -123,7 +123,7 @@ def _make_relax(space: Space, simd: bool, start: bool) -> Any:
 
 
 @functools.cache
-def _make_shift(space: Space) -> Any:
+def _make_shift(space: Space) -> wp.Kernel:
     """Kernel: x̂ = x − ½ψ, not further away than ``bound`` spacings (M13)."""
     real, vec = space.real, space.vec
     Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
@@ -141,7 +141,7 @@ def _make_shift(space: Space) -> Any:
 
 
 @functools.cache
-def _make_correct(space: Space, simd: bool) -> Any:
+def _make_correct(space: Space, simd: bool) -> wp.Kernel:
     """Kernel: L_a = (Σ_b V_b g_ab ξ ⊗ ξ̂)⁻¹ with ξ̂ between balanced positions: M4 stays exact for linear fields (M13).
 
     Where the sum has lost half of det K, or K a direction, in neighbourhoods nearly flat, L_a stays that of M3.
@@ -165,7 +165,7 @@ def _make_correct(space: Space, simd: bool) -> Any:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    def __init__(self, option: Balance, space: Space, particles: Any, device: Any):
+    def __init__(self, option: Balance, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
         super().__init__(space, device)
         self.option, self.particles, n = option, particles, len(particles.mass)
         self.torn = wp.full(1, WELL, dtype=wp.int32, device=device)
@@ -175,7 +175,7 @@ class BalancedPairs(UpwindForces):
         """The potentials that shifting (M15) follows before the next refresh."""
         return {"BalancedPairs.psi": self.psi}
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Balance the new reference."""
         reference, near, simd = configuration.fields, configuration.near, configuration.simd
         n, K = len(self.psi), configuration.K

@@ -2,17 +2,17 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
+from ..structs import StateArrays
 from .pair_forces import PairForces
 from .reference import Configuration
 from .sensor import Sensor
-from .stabiliser import Stabiliser
+from .stabiliser import Stabiliser, Sums
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Upwind:
 
 
 @functools.cache
-def upwind(space: Space) -> Any:
+def upwind(space: Space) -> wp.Function:
     """``wp.func`` force on a from b [N]: A_ab ½ [Z n⊗n + Z_s (I − n⊗n)] · jump (M9), A_ab = V_a V_b |W'|.
 
     Z = ½ (ρc_a + ρc_b) is the mean impedance of pressure waves, Z_s of shear waves; n points from a to b as they are
@@ -58,7 +58,7 @@ def upwind(space: Space) -> Any:
 
 
 @functools.cache
-def blend(space: Space) -> Any:
+def blend(space: Space) -> wp.Function:
     """``wp.func`` jump per direction: (1 − d) ε r_ab + d (v_b − v_a), d from the sensor of both ends (M9)."""
     real, vec, dim = space.real, space.vec, space.dim
 
@@ -74,7 +74,7 @@ def blend(space: Space) -> Any:
 
 
 @functools.cache
-def make_dissipation(space: Space, sensed: bool) -> Any:
+def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
     """Kernel: D_a of M9; antisymmetric in the pair."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
@@ -124,35 +124,26 @@ class UpwindForces(Stabiliser):
 
     corrects = False
 
-    def __init__(self, space: Space, device: Any):
+    def __init__(self, space: Space, device: wp.DeviceLike):
         self.space, self.device, self._launch = space, device, Launcher(device)
         self._in_one_pass: PairForces | None = None
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare: M9 needs the lists only."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
         """The portable kernels do, the SIMD pass makes its own."""
-        return sensed or not configuration.simd
+        return not configuration.pairs_by_simd(sensed)
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: Any,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: Any,
-    ) -> None:
-        """Internal force (M5) and dissipation (M9) into ``forces``."""
-        if not self.takes_dual(configuration, sensor is not None):
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5) and dissipation (M9)."""
+        configuration, forces, sensed = sums.configuration, sums.forces, sums.sensor is not None
+        if not self.takes_dual(configuration, sensed):
             if self._in_one_pass is None:
                 self._in_one_pass = PairForces(self.space, len(v), self.device)
-            self._in_one_pass.compute(configuration, flux, x, v, grad_v, epsilon, forces)
+            self._in_one_pass.compute(configuration, sums.flux, x, v, sums.grad_v, sums.epsilon, forces)
             return
-        configuration.divergence(flux.Pi, forces.internal)
-        arguments = [configuration.fields, configuration.near, flux, x, v, grad_v, epsilon]
-        arguments += [sensor if sensor is not None else v, forces.dissipation]
-        self._launch(make_dissipation(self.space, sensor is not None), len(v), arguments)
+        configuration.divergence(sums.flux.Pi, forces.internal)
+        arguments = [configuration.fields, configuration.near, sums.flux, x, v, sums.grad_v, sums.epsilon]
+        arguments += [sums.sensor if sensed else v, forces.dissipation]
+        self._launch(make_dissipation(self.space, sensed), len(v), arguments)

@@ -1,7 +1,6 @@
 """The internal force (M5) alone, where the arrangement is as it was at the start and needs no correction."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -9,13 +8,14 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..simd import BY_TWO_DUAL, packed_rows, prelude
 from ..space import Space
+from ..structs import StateArrays
 from .reference import Configuration
 from .sharpening import Sharpener, make_pack
-from .stabiliser import Stabiliser
+from .stabiliser import Stabiliser, Sums
 
 
 @functools.cache
-def _make_forces(space: Space, tilted: bool) -> Any:
+def _make_forces(space: Space, tilted: bool) -> wp.Kernel:
     """Kernel: M5 from packed rows; with tilted weights their Σ own ξ is known (M17), without it is summed here."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -78,37 +78,27 @@ class DualForces(Stabiliser):
 
     corrects = False
 
-    def __init__(self, space: Space, n: int, sharpener: Sharpener | None, device: Any):
+    def __init__(self, space: Space, n: int, sharpener: Sharpener | None, device: wp.DeviceLike):
         self.space, self._sharpener, self._launch = space, sharpener, Launcher(device)
         self._rows = packed_rows(space, n, space.dim, device)
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
         """The portable kernel does, the SIMD pass makes its own."""
         return not configuration.simd
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: Any,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: Any,
-    ) -> None:
-        """Internal force (M5) into ``forces``."""
-        n, rows = len(forces.internal), self._rows
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5)."""
+        configuration, flux, internal, rows = sums.configuration, sums.flux, sums.forces.internal, self._rows
         if configuration.simd or self._sharpener is not None:
-            self._launch(make_pack(self.space), n, [configuration.fields, flux.Q, rows])
+            self._launch(make_pack(self.space), len(internal), [configuration.fields, flux.Q, rows])
         if self._sharpener is not None:
             self._sharpener.stress(flux.Q, rows, flux.Pi)
             rows = self._sharpener.stress_rows
         if not configuration.simd:
-            configuration.divergence(flux.Pi, forces.internal)
+            configuration.divergence(flux.Pi, internal)
             return
         kernel = _make_forces(self.space, configuration.tilt is not None)
-        self._launch(kernel, n, [configuration.fields, configuration.near, rows, forces.internal])
+        self._launch(kernel, len(internal), [configuration.fields, configuration.near, rows, internal])

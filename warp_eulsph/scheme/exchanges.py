@@ -10,10 +10,11 @@ from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..reduce import SumOfParticles
 from ..space import Space, vector_type
+from ..structs import ClockArrays, ParticleArrays, StateArrays
 
 
 @functools.cache
-def _make_work(space: Space) -> Any:
+def _make_work(space: Space) -> wp.Kernel:
     """Kernel of ``SumOfParticles``: work of an interaction on the particles in this step, Δt f·v̄."""
     vec, Particles, State = space.vec, structure(space, "Particles"), structure(space, "State")
     Clock, precise, wide = clock_structure(space), vector_type(space.dim, wp.float64), wp.float64
@@ -41,7 +42,7 @@ def _make_work(space: Space) -> Any:
 
 
 @functools.cache
-def _make_book_work(entry_type: Any, external: int) -> Any:
+def _make_book_work(entry_type: Any, external: int) -> wp.Kernel:
     """Kernel: an interaction's work, which is in the entry of the external forces', to its own account."""
     wide = wp.float64
 
@@ -56,16 +57,27 @@ def _make_book_work(entry_type: Any, external: int) -> Any:
 
 
 class Exchange(NamedTuple):
-    """An interaction as the ledger sees it: its forces [N] on particles, (n,) of vec, and the energy [J] it holds."""
+    """An interaction as the ledger sees it.
+
+    Its forces [N] on particles, (n,) of vec, the energy [J] it holds, and what came in through it from outside.
+    """
 
     forces: wp.array
     energy: Callable[[], float]
+    supplied: Callable[[], float]
 
 
 class Exchanges:
     """Accounts of the interactions, one each."""
 
-    def __init__(self, space: Space, particles: Any, clock: Any, exchanges: Sequence[Exchange], device: Any):
+    def __init__(
+        self,
+        space: Space,
+        particles: ParticleArrays,
+        clock: ClockArrays,
+        exchanges: Sequence[Exchange],
+        device: wp.DeviceLike,
+    ):
         self.space, self.particles, self.clock, self._exchanges = space, particles, clock, exchanges
         self._launch = Launcher(device)
         self._works, self._start = (wp.zeros(len(exchanges), dtype=wp.float64, device=device) for _ in range(2))
@@ -81,7 +93,7 @@ class Exchanges:
         """Work so far and the energies held at the start, by name."""
         return {"Exchanges.works": self._works, "Exchanges.start": self._start}
 
-    def record(self, U: Any, v_old: wp.array, total: wp.array, external: int) -> None:
+    def record(self, U: StateArrays, v_old: wp.array, total: wp.array, external: int) -> None:
         """Book a step from velocities ``v_old`` to ``U``, and take it out of entry ``external`` of the others."""
         for k, exchange in enumerate(self._exchanges):
             self._sum(_make_work(self.space), [self.particles, U, v_old, exchange.forces, self.clock], self._step)
@@ -94,7 +106,14 @@ class Exchanges:
     def accounts(self) -> list[float]:
         """Energy that each added since the start [J], with what it holds; reads the device.
 
-        0 where its forces are those of its energy and steps are short, less where it dissipates.
+        0 where its forces are those of its energy and steps are short, less where it dissipates. What was supplied
+        through it is not in it.
         """
         booked = zip(self._exchanges, self._works.numpy().tolist(), self._start.numpy().tolist(), strict=True)
-        return [work + float(exchange.energy()) - start for exchange, work, start in booked]
+        return [
+            work + float(exchange.energy()) - start - float(exchange.supplied()) for exchange, work, start in booked
+        ]
+
+    def supplied(self) -> float:
+        """Energy that came in from outside through interactions since the start [J]; reads the device."""
+        return float(sum(exchange.supplied() for exchange in self._exchanges))

@@ -14,12 +14,13 @@ from ..linalg import det, inverse, largest_shortening
 from ..materials import Law, Material
 from ..materials.base import history_row, long_form
 from ..space import Space
+from ..structs import ClockArrays, FluxArrays, ParticleArrays
 from .policy import Always, Every, ReferencePolicy
 from .reference import Configuration, resolution
 
 
 @functools.cache
-def velocity_gradient(space: Space, fixed: bool) -> Any:
+def velocity_gradient(space: Space, fixed: bool) -> wp.Function:
     """``wp.func`` l = Ḟ F⁻¹ of particle a, whose deformation gradient is F, from ∇_k v."""
     mat, Reference, invert = space.mat, structure(space, "Reference"), inverse(space)
 
@@ -33,7 +34,7 @@ def velocity_gradient(space: Space, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> Any:
+def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> wp.Kernel:
     mat, real, determinant = space.mat, space.real, det(space)
     Reference, Flux, Clock = structure(space, "Reference"), structure(space, "Flux"), clock_structure(space)
     Constants, row, remembers = law.Constants, history_row(space, law), bool(law.history)
@@ -77,7 +78,7 @@ STRAIN = 0.25
 
 
 @functools.cache
-def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
+def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> wp.Kernel:
     real, mat = space.real, space.mat
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Clock, Constants, dim = clock_structure(space), law.Constants, float(space.dim)
@@ -131,7 +132,7 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_moduli(space: Space, law: Law) -> Any:
+def _make_moduli(space: Space, law: Law) -> wp.Kernel:
     """Kernel of one thread: the wave moduli at F = I."""
     real, dim, pair, Constants = space.real, space.dim, space.row(2), law.Constants
     row, moduli = history_row(space, law), long_form(space, law).wave_moduli
@@ -145,7 +146,7 @@ def _make_moduli(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_energy(space: Space, law: Law) -> Any:
+def _make_energy(space: Space, law: Law) -> wp.Kernel:
     mat, row, remembers = space.mat, history_row(space, law), bool(law.history)
     Particles, Constants, density = structure(space, "Particles"), law.Constants, long_form(space, law).energy
 
@@ -169,7 +170,7 @@ def _make_energy(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_forget(space: Space, law: Law) -> Any:
+def _make_forget(space: Space, law: Law) -> wp.Kernel:
     """Kernel: what a law without a history leaves of F after a full step."""
     mat, Constants, kept = space.mat, law.Constants, law.update
 
@@ -182,15 +183,16 @@ def _make_forget(space: Space, law: Law) -> Any:
 
 
 @functools.cache
-def _make_update(space: Space, law: Law, fixed: bool) -> Any:
+def _make_update(space: Space, law: Law, fixed: bool, tied: bool) -> wp.Kernel:
     """Kernel: the history after a full step and the energy that it dissipated; a step of length zero changes nothing.
 
-    A particle whose history is not finite is bad: its law found no state.
+    A particle whose history is not finite is bad: its law found no state. Where the law yields and is ``tied``, so does
+    the tie (M16).
     """
     real, mat, row, length = space.real, space.mat, history_row(space, law), len(law.start)
     Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
     Flux, Constants, updated = structure(space, "Flux"), law.Constants, law.update
-    rate_of = velocity_gradient(space, fixed)
+    rate_of, secant_of = velocity_gradient(space, fixed), law.secant
 
     @wp.kernel(module="unique", enable_backward=False)
     def update(
@@ -207,6 +209,8 @@ def _make_update(space: Space, law: Law, fixed: bool) -> Any:
     ):
         a = first + wp.tid()
         flux.dissipated[a] = real(0.0)
+        if wp.static(tied):
+            flux.slipped[a] = real(0.0)
         dt = real(clock.dt[0])
         if dt > real(0.0):
             rate = rate_of(a, F[a], grad_v[a], reference)
@@ -214,6 +218,10 @@ def _make_update(space: Space, law: Law, fixed: bool) -> Any:
             F[a] = F_a
             history[a - begin] = h
             flux.dissipated[a] = particles.V0[a] * lost
+            if wp.static(tied):
+                secant = wp.sqrt(secant_of(h, c))
+                flux.slipped[a] = (flux.secant[a] - secant) * flux.tied[a]
+                flux.secant[a] = secant
             nothing = real(0.0)  # NaN as soon as a component is not finite
             for i in range(wp.static(length)):
                 nothing += h[i] * real(0.0)
@@ -224,7 +232,7 @@ def _make_update(space: Space, law: Law, fixed: bool) -> Any:
 
 
 @functools.cache
-def _make_rebase(space: Space, law: Law) -> Any:
+def _make_rebase(space: Space, law: Law) -> wp.Kernel:
     """Kernel: F and history as a new reference takes them."""
     mat, row, Constants, rebased = space.mat, history_row(space, law), law.Constants, law.rebase
 
@@ -276,7 +284,9 @@ class Flux:
         bodies: particle indices of each body.
     """
 
-    def __init__(self, space: Space, bodies: list[tuple[Material, int]], particles: Any, device: Any):
+    def __init__(
+        self, space: Space, bodies: list[tuple[Material, int]], particles: ParticleArrays, device: wp.DeviceLike
+    ):
         self.space, self.particles, self.device = space, particles, device
         self._launch = Launcher(device)
         self.parts: list[Part] = []
@@ -289,13 +299,14 @@ class Flux:
             self.parts.append(Part(first, count, law, material.filled_constants(law), history))
             first += count
         remembers = any(part.law.history for part in self.parts)
-        empty = ("Pi", "tie", "drag") if remembers else ("Pi", "tie", "drag", "dissipated")
-        self.fields = allocate(space, "Flux", first, device, empty=empty)
+        empty = ["Pi", "tie", "drag", "secant", "tied", "slipped"] + ([] if remembers else ["dissipated"])
+        self.fields: FluxArrays = allocate(space, "Flux", first, device, empty=empty)
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
 
     def evolving(self) -> dict[str, wp.array]:
-        """The histories of the bodies that have one; what a checkpoint must hold."""
-        return {f"Flux.history.{i}": part.history for i, part in enumerate(self.parts) if part.law.history}
+        """The histories of the bodies that have one, and what yielding left of the tie; what a checkpoint must hold."""
+        held = {f"Flux.history.{i}": part.history for i, part in enumerate(self.parts) if part.law.history}
+        return held | ({"Flux.secant": self.fields.secant} if len(self.fields.slipped) else {})
 
     def keep_dual(self) -> None:
         """Have ``compute`` write Π too, for forces that take it from the array (M5)."""
@@ -315,7 +326,7 @@ class Flux:
         return found
 
     def compute(
-        self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any, fraction: float = 0.0
+        self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays, fraction: float = 0.0
     ) -> None:
         """Q of the deformation gradients ``F`` (M1), and Π = Q Lᵀ (M5) if it is kept.
 
@@ -326,7 +337,7 @@ class Flux:
             kernel = _make_flux(self.space, part.law, configuration.fixed, len(self.fields.Pi) > 0)
             self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
 
-    def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
+    def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
         for part in self.parts:
             arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields]
@@ -339,12 +350,13 @@ class Flux:
             arguments = [part.first, F, part.history, self.particles, part.constants, out]
             self._launch(_make_energy(self.space, part.law), part.size, arguments, part.first)
 
-    def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: Any) -> None:
+    def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """After a full step that ``grad_v`` = ∇_k v made: what each law keeps of F, its history, what it dissipated."""
         for part in self.parts:
             if part.law.history and part.law.update is not None:
                 arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields, clock]
-                kernel = _make_update(self.space, part.law, configuration.fixed)
+                tied = part.law.secant is not None and len(self.fields.slipped) > 0
+                kernel = _make_update(self.space, part.law, configuration.fixed, tied)
                 self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
             elif part.law.update is not None:
                 self._launch(_make_forget(self.space, part.law), part.size, [F, part.constants], part.first)

@@ -6,8 +6,6 @@ not where a refresh found more neighbours than the lists have room for; then the
 So steps by graphs equal those by the host in every bit, however many are launched between two looks.
 """
 
-from typing import Any
-
 import warp as wp
 
 from ..boundaries import Bound
@@ -29,8 +27,8 @@ class StepGraphs:
         self.stepper = stepper
         self._by_count = all(medium.policy.by_count for medium in stepper.media)
         self._taken: set[tuple[int, ...]] = set()
-        self._graphs: dict[tuple[int, ...], Any] = {}
-        self._lists: list[Any] = []  # the graphs are of these lists, which may grow
+        self._graphs: dict[tuple[int, ...], wp.Graph] = {}
+        self._lists: list[wp.array] = []  # the graphs are of these lists, which may grow
 
     def take(self, most: int) -> None:
         """Take steps, ``most`` at most, fewer when the target is reached or a particle turns bad."""
@@ -63,7 +61,7 @@ class StepGraphs:
             self._graphs.clear()
             self._lists = lists
 
-    def _graph(self, due: tuple[int, ...]) -> Any:
+    def _graph(self, due: tuple[int, ...]) -> wp.Graph:
         if due not in self._graphs:
             with wp.ScopedCapture(self.stepper.device) as capture:
                 self._record(due)

@@ -10,6 +10,7 @@ from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import det
 from ..space import Space
+from ..structs import ClockArrays, StateArrays
 
 #: Value of ``clock.bad`` while every particle is well.
 WELL = 2**31 - 1
@@ -36,7 +37,7 @@ def last_good(output: Any) -> str:
 
 
 @functools.cache
-def _make_check(space: Space) -> Any:
+def _make_check(space: Space) -> wp.Kernel:
     real = space.real
     State, Clock, determinant = structure(space, "State"), clock_structure(space), det(space)
 
@@ -54,6 +55,6 @@ def _make_check(space: Space) -> Any:
     return check
 
 
-def check(launch: Launcher, space: Space, state: Any, clock: Any) -> None:
+def check(launch: Launcher, space: Space, state: StateArrays, clock: ClockArrays) -> None:
     """Set ``clock.bad`` to the lowest index of a particle with det F ≤ 0 or a non-finite x, v or F."""
     launch(_make_check(space), len(state.x), [state, clock])

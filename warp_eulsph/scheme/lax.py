@@ -8,6 +8,7 @@ import warp as wp
 
 from ..fields import clock_structure, part_of, structure
 from ..space import Space
+from ..structs import StateArrays
 from .balance import Balance
 from .base import Scheme
 from .dissipation import Upwind
@@ -39,7 +40,7 @@ class Lax(Scheme):
 
 
 @functools.cache
-def _make_note(space: Space) -> Any:
+def _make_note(space: Space) -> wp.Kernel:
     """Kernel: dv = S(v) − v."""
     vec = space.vec
 
@@ -52,7 +53,7 @@ def _make_note(space: Space) -> Any:
 
 
 @functools.cache
-def _make_adopt(space: Space) -> Any:
+def _make_adopt(space: Space) -> wp.Kernel:
     """Kernel: U and the new state change places; not in a step of Δt = 0, which must change nothing."""
     vec = space.vec
     State, Clock = structure(space, "State"), clock_structure(space)
@@ -108,8 +109,8 @@ class LaxStepper(Stepper):
         self.ledger.record(U, other, self._dv_by_medium)
         self.clock.tick()
 
-    def _note_smoothing(self, U: Any, other: Any) -> None:
+    def _note_smoothing(self, U: StateArrays, other: Any) -> None:
         self._launch(_make_note(self.space), self.n, [U.v, other.v, self.dv])
 
-    def _adopt(self, U: Any, other: Any) -> None:
+    def _adopt(self, U: StateArrays, other: Any) -> None:
         self._launch(_make_adopt(self.space), self.n, [self.clock.fields, U, other, self.dv])

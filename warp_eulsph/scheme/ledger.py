@@ -11,9 +11,10 @@ from ..execution import Launcher
 from ..fields import clock_structure, part_of, structure
 from ..reduce import Sum, SumOfParticles
 from ..space import Space, matrix_type, vector_type
+from ..structs import ParticleArrays, StateArrays
 from .exchanges import Exchanges
 from .medium import Medium
-from .powers import loads_power, lost, note, powers, work
+from .powers import loads_power, lost, note, powers, slipped, work
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
@@ -34,8 +35,15 @@ _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 @functools.cache
 def _make_entries(
-    space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, damped: bool, inelastic: bool
-) -> Any:
+    space: Space,
+    tied: bool,
+    dragged: bool,
+    limited: bool,
+    smoothed: bool,
+    damped: bool,
+    inelastic: bool,
+    yielding: bool,
+) -> wp.Kernel:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
     With v̄ = ½(vⁿ + v^{n+1}) a force f changes the kinetic energy by exactly Δt f·v̄. The stepping account is what the
@@ -43,7 +51,8 @@ def _make_entries(
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
     The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
-    where it has a stress (M9). The material's is what the laws say that they dissipated (``inelastic``).
+    where it has a stress (M9). The material's is what the laws say that they dissipated (``inelastic``), and what the
+    tie lost where they yield (``yielding``).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -53,6 +62,7 @@ def _make_entries(
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
     Flux, keep, work_of, lost_of = structure(space, "Flux"), note(space), work(space), lost(space, inelastic)
+    slipped_of = slipped(space, yielding)
     precise, pairs_power = vector_type(space.dim, wp.float64), powers(space, tied, dragged)
     power_of = loads_power(space, damped)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
@@ -86,7 +96,7 @@ def _make_entries(
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
             of_pairs = pairs_power(a, flux, strain_rate)
             strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate) - of_pairs[0] - of_pairs[1]
-            lost = lost_of(a, flux)
+            lost, slip = lost_of(a, flux), slipped_of(a, flux)
             stepping = W[a] - W_old[a] + lost - dt * strain_power
             stepping += dt * work_of(forces.internal[a], v_mean - precise(half.v[a]))
             limiter = wide(0.0)
@@ -101,9 +111,9 @@ def _make_entries(
                 wp.dot(impulse, v_mean),
                 dt * loads[1],
                 dt * (work_of(forces.dissipation[a], v_mean) - of_pairs[1]),
-                -lost,
+                -lost - slip,
                 dt * work_of(forces.correction[a], v_mean),
-                dt * (work_of(forces.tie[a], v_mean) - of_pairs[0]),
+                dt * (work_of(forces.tie[a], v_mean) - of_pairs[0]) + slip,
                 limiter,
                 stepping,
                 wide(0.0),
@@ -117,7 +127,7 @@ def _make_entries(
 
 
 @functools.cache
-def _make_shift_entry(space: Space) -> Any:
+def _make_shift_entry(space: Space) -> wp.Kernel:
     """Kernel of ``SumOfParticles``: energy gained since the last entry, all of it by shifting (M15)."""
     vec, Particles, State, wide = space.vec, structure(space, "Particles"), structure(space, "State"), wp.float64
     precise = vector_type(space.dim, wp.float64)
@@ -150,7 +160,7 @@ def _make_shift_entry(space: Space) -> Any:
 
 
 @functools.cache
-def _make_subtract() -> Any:
+def _make_subtract() -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def subtract(first: int, value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
         a = first + wp.tid()
@@ -160,7 +170,7 @@ def _make_subtract() -> Any:
 
 
 @functools.cache
-def _make_kinetic(space: Space) -> Any:
+def _make_kinetic(space: Space) -> wp.Kernel:
     Particles, vec = structure(space, "Particles"), space.vec
     precise = wp.types.vector(length=space.dim, dtype=wp.float64)
 
@@ -174,7 +184,7 @@ def _make_kinetic(space: Space) -> Any:
 
 
 @functools.cache
-def _make_own(space: Space) -> Any:
+def _make_own(space: Space) -> wp.Kernel:
     """Kernel: leave out what ghosts hold."""
     Particles = structure(space, "Particles")
 
@@ -187,7 +197,7 @@ def _make_own(space: Space) -> Any:
 
 
 @functools.cache
-def _make_book() -> Any:
+def _make_book() -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def book(step: wp.array(dtype=_Entry), total: wp.array(dtype=_Entry)):
         total[0] = total[0] + step[0]
@@ -214,10 +224,10 @@ class Ledger:
     def __init__(
         self,
         space: Space,
-        particles: Any,
+        particles: ParticleArrays,
         media: Sequence[Medium],
         clock: DeviceClock,
-        device: Any,
+        device: wp.DeviceLike,
         exchanges: Exchanges | None = None,
         damped: bool = False,
     ):
@@ -234,7 +244,7 @@ class Ledger:
         self.start, self._most = 0.0, 0.0
         self._exchanges, self._damped = exchanges, damped
 
-    def open(self, U: Any) -> None:
+    def open(self, U: StateArrays) -> None:
         """Start the books at state ``U``."""
         wp.copy(self._v_old, U.v)
         for page in self._pages:
@@ -249,12 +259,12 @@ class Ledger:
         held = {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
         return held if self._exchanges is None else held | self._exchanges.evolving()
 
-    def open_limiter(self, U: Any) -> None:
+    def open_limiter(self, U: StateArrays) -> None:
         """Note the stored energies before limiters change ``U``."""
         for page in self._limited():
             page.medium.flux.energy(page.medium.of(U).F, page.dW_limited)
 
-    def close_limiter(self, U: Any) -> None:
+    def close_limiter(self, U: StateArrays) -> None:
         """Note what limiters did to the stored energies."""
         for page in self._limited():
             page.medium.flux.energy(page.medium.of(U).F, page.W)
@@ -263,7 +273,7 @@ class Ledger:
     def _limited(self) -> list[_Page]:
         return [page for page in self._pages if page.medium.limiter is not None]
 
-    def record(self, U: Any, half: Any, smoothed: Sequence[wp.array] | None = None) -> None:
+    def record(self, U: StateArrays, half: StateArrays, smoothed: Sequence[wp.array] | None = None) -> None:
         """Book a step that ended in ``U``, with the half state; its media have ∇v^{n+½} and the forces.
 
         ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (particles of the medium,) of vec for each.
@@ -282,10 +292,11 @@ class Ledger:
             arguments += [self.clock.fields, medium.forces]
             tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
             limits, smooths, inelastic = limiter is not None, smoothed is not None, len(flux.fields.dissipated) > 0
-            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped, inelastic)
+            yielding = len(flux.fields.slipped) > 0
+            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped, inelastic, yielding)
             self._book(page, kernel, arguments)
 
-    def book_shift(self, U: Any) -> None:
+    def book_shift(self, U: StateArrays) -> None:
         """Book what shifting did to ``U`` since the last step."""
         for page in self._pages:
             medium = page.medium
@@ -293,26 +304,26 @@ class Ledger:
             arguments = [medium.particles, medium.of(U), page.v_old, page.W_old, page.W]
             self._book(page, _make_shift_entry(self.space), arguments)
 
-    def _book(self, page: _Page, kernel: Any, arguments: list[Any]) -> None:
+    def _book(self, page: _Page, kernel: wp.Kernel, arguments: list[Any]) -> None:
         page.sum_entries(kernel, arguments, self._step)
         self._launch.once(_make_book(), 1, [self._step, self._total])
 
-    def kinetic(self, U: Any) -> float:
+    def kinetic(self, U: StateArrays) -> float:
         """Kinetic energy [J]; reads the device."""
         self._launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W])
         self._sum(self._W, self._energy)
         return float(self._energy.numpy()[0])
 
-    def stored_by_particle(self, U: Any) -> np.ndarray:
+    def stored_by_particle(self, U: StateArrays) -> np.ndarray:
         """Stored energy [J] of each particle, by place, (n,); reads the device."""
         self._store(U)
         return self._W.numpy().copy()
 
-    def _store(self, U: Any) -> None:
+    def _store(self, U: StateArrays) -> None:
         for page in self._pages:
             page.medium.flux.energy(page.medium.of(U).F, page.W)
 
-    def stored(self, U: Any) -> float:
+    def stored(self, U: StateArrays) -> float:
         """Stored energy [J]; reads the device."""
         self._store(U)
         self._launch(_make_own(self.space), len(self._W), [self.particles, self._W])
@@ -330,7 +341,10 @@ class Ledger:
     def accounts(self) -> dict[str, float]:
         """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
         found = dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
-        return found | ({} if self._exchanges is None else {"interaction": sum(self.exchanged())})
+        if self._exchanges is not None:
+            found["external"] += self._exchanges.supplied()
+            found["interaction"] = sum(self.exchanged())
+        return found
 
     def made(self) -> float:
         """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""
@@ -339,6 +353,6 @@ class Ledger:
         self._most = max(self._most, put_in)
         return max(accounts["stepping"], 0.0) / self._most if self._most > 0.0 else 0.0
 
-    def residual(self, U: Any) -> float:
+    def residual(self, U: StateArrays) -> float:
         """Energy that no account explains [J]; round-off if the operators are duals of each other."""
         return self.kinetic(U) + self.stored(U) + self.held() - self.start - sum(self.accounts().values())

@@ -2,7 +2,6 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
@@ -10,6 +9,7 @@ from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..operators.values import Shepard, Values
 from ..space import Space
+from ..structs import ClockArrays, ParticleArrays, StateArrays
 from .reference import Configuration
 from .sensor import PaperSensor, Sensor
 
@@ -36,13 +36,15 @@ class FluxCorrectedTransport:
     conservative: bool = True
     values: Values = Shepard()
 
-    def build(self, space: Space, particles: Any, configuration: Configuration, device: Any) -> "MassDiffusion":
+    def build(
+        self, space: Space, particles: ParticleArrays, configuration: Configuration, device: wp.DeviceLike
+    ) -> "MassDiffusion":
         """Allocate for the particles of ``configuration``."""
         return MassDiffusion(self, space, particles, configuration, device)
 
 
 @functools.cache
-def _make_strength(space: Space) -> Any:
+def _make_strength(space: Space) -> wp.Kernel:
     """Kernel: sd_a = d_a m_a / (M^L − M^C)_aa."""
     real, vec = space.real, space.vec
     Particles = structure(space, "Particles")
@@ -67,7 +69,7 @@ def _make_strength(space: Space) -> Any:
 
 
 @functools.cache
-def _make_times_mass(space: Space, components: int) -> Any:
+def _make_times_mass(space: Space, components: int) -> wp.Kernel:
     row = space.row(components)
     Particles = structure(space, "Particles")
 
@@ -80,7 +82,7 @@ def _make_times_mass(space: Space, components: int) -> Any:
 
 
 @functools.cache
-def by_direction(space: Space, components: int) -> Any:
+def by_direction(space: Space, components: int) -> wp.Function:
     """``wp.func`` row f with each component times that of its direction: v_i with d_i, F_ij with d_i."""
     vec, row, dim = space.vec, space.row(components), space.dim
 
@@ -95,7 +97,7 @@ def by_direction(space: Space, components: int) -> Any:
 
 
 @functools.cache
-def _make_weigh(space: Space, components: int) -> Any:
+def _make_weigh(space: Space, components: int) -> wp.Kernel:
     vec, row = space.vec, space.row(components)
     scale = by_direction(space, components)
 
@@ -108,7 +110,7 @@ def _make_weigh(space: Space, components: int) -> Any:
 
 
 @functools.cache
-def _make_increment(space: Space, components: int, conservative: bool) -> Any:
+def _make_increment(space: Space, components: int, conservative: bool) -> wp.Kernel:
     """Kernel: the diffusion of f; ``mixed`` = M^C f, ``mixed_weighed`` = M^C (sd f), ``mixed_sd`` = M^C sd.
 
     As printed: ΔU_a = sd_a [Σ_b M^C_ab U_b − M^L_aa U_a]/m_a.
@@ -141,7 +143,7 @@ def _make_increment(space: Space, components: int, conservative: bool) -> Any:
 
 
 @functools.cache
-def _make_add(space: Space) -> Any:
+def _make_add(space: Space) -> wp.Kernel:
     """Kernel: add the increments, none in a step of Δt = 0, which must change nothing."""
     vec, mat = space.vec, space.mat
     State, Clock = structure(space, "State"), clock_structure(space)
@@ -169,9 +171,9 @@ class MassDiffusion:
         self,
         option: FluxCorrectedTransport,
         space: Space,
-        particles: Any,
+        particles: ParticleArrays,
         configuration: Configuration,
-        device: Any,
+        device: wp.DeviceLike,
     ):
         self.option, self.space, self.particles, self.device = option, space, particles, device
         self.configuration, self._launch = configuration, Launcher(device)
@@ -191,7 +193,7 @@ class MassDiffusion:
         self.interpolation = self.configuration.interpolation(self.option.values)
         self.interpolation.mass_diagonals(self.lumped, self.consistent)
 
-    def prepare(self, U: Any, d: wp.array) -> None:
+    def prepare(self, U: StateArrays, d: wp.array) -> None:
         """Increments d × diffusion of the state ``U`` = Uⁿ, (n,) of vec ``d`` from the sensor."""
         strength = [self.particles, self.lumped, self.consistent, d, self._sd]
         self._launch(_make_strength(self.space), len(d), strength)
@@ -200,7 +202,7 @@ class MassDiffusion:
         for f, increment in ((U.v, self.dv), (U.F, self.dF)):
             self._diffuse(self._rows(f), self._rows(increment))
 
-    def apply(self, U: Any, clock: Any) -> None:
+    def apply(self, U: StateArrays, clock: ClockArrays) -> None:
         """Add the increments to ``U``."""
         self._launch(_make_add(self.space), len(self.dv), [clock, self.dv, self.dF, U])
 

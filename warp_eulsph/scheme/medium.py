@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -11,6 +10,7 @@ from ..boundaries import Bound
 from ..execution import Launcher
 from ..fields import part, part_of
 from ..space import Space
+from ..structs import ClockArrays, ForceArrays, ParticleArrays, StateArrays
 from .base import Scheme
 from .dissipation import UpwindForces
 from .dual_forces import DualForces
@@ -22,8 +22,8 @@ from .reference import Configuration
 from .sensor import SensorField
 from .sharpening import Sharpener
 from .shifting import Shifter
-from .stabiliser import Stabiliser
-from .updates import make_drift, make_kick, make_predict
+from .stabiliser import Stabiliser, Sums
+from .updates import make_drift, make_kick, make_mean, make_predict
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class MediumParts:
     options: Scheme
     policy: ReferencePolicy
     span: range
-    particles: Any
+    particles: ParticleArrays
     flux: Flux
     configuration: Configuration
     surface_given: bool
@@ -73,15 +73,18 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
+        surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
         particles, forces, grad_v: of its own particles, views of what the world has.
+        steady: its steps begin with the ∇_k v that the one before kept.
     """
 
-    def __init__(self, space: Space, parts: MediumParts, conditions: Sequence[Bound], device: Any):
+    def __init__(self, space: Space, parts: MediumParts, conditions: Sequence[Bound], device: wp.DeviceLike):
         self.space, self.device, self.n = space, device, len(parts.span)
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
+        self.surface_given = parts.surface_given
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
@@ -104,7 +107,7 @@ class Medium:
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            simd, upwind = self.configuration.simd and not sensed, options.dissipation if plain else None
+            simd, upwind = self.configuration.pairs_by_simd(sensed), options.dissipation if plain else None
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
@@ -118,51 +121,67 @@ class Medium:
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
 
-    def join(self, U: Any, half: Any, forces: Any, grad_v: wp.array, clock: Any, moves_surfaces: bool) -> None:
+    def join(
+        self,
+        U: StateArrays,
+        half: StateArrays,
+        forces: ForceArrays,
+        grad_v: wp.array,
+        clock: ClockArrays,
+        moves_surfaces: bool,
+    ) -> None:
         """See the own particles of the world's two states, of ``forces`` and of ∇v, by its ``clock``."""
         self._whole, self._own = U, part(self.space, U, "State", self.span)
         self._own_half = part(self.space, half, "State", self.span)
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
+        upwind, flux = self.options.dissipation, self.flux.fields
+        epsilon = 0.0 if upwind is None else upwind.epsilon
+        d = None if upwind is None or upwind.sensor is None else self.sensors[upwind.sensor].d
+        self.sums = Sums(self.configuration, flux, self.grad_v, self.forces, epsilon, d)
 
-    def of(self, state: Any) -> Any:
+    def keep_gradients(self, on: bool) -> None:
+        """Whether each step leaves ∇_k v^{n+1} for the next one."""
+        self.steady, self.kept = on, wp.zeros_like(self.grad_v) if on else self.grad_v
+
+    def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
         return self._own if state is self._whole else self._own_half
 
     # the reference
 
-    def due(self, step: int, state: Any) -> bool:
+    def due(self, step: int, state: StateArrays) -> bool:
         """Whether the reference is to be refreshed before step number ``step``."""
         return not self.policy.fixed and self.policy.due(step, self.configuration, self.of(state).F)
 
-    def start(self, state: Any) -> None:
+    def start(self, state: StateArrays) -> None:
         """Make ``state`` the first reference."""
         self.configuration.refresh(self.of(state))
 
-    def find_surface(self, state: Any) -> None:
+    def find_surface(self, state: StateArrays) -> None:
         """s_a = e_a at the start (M10)."""
         nothing_yet = self.forces.free_v
         unit = None if self.sharpener is None else self.sharpener.unit()
         self.configuration.defect(nothing_yet, self.of(state).surface, unit)
 
-    def look_outward(self, state: Any) -> None:
+    def look_outward(self, state: StateArrays) -> None:
         """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""
         if self.configuration.tilt is None and self.sharpener is None:
             wp.copy(self.particles.outward, self.of(state).surface)
         elif self.configuration.tilt is None:
             self.configuration.defect(self.forces.free_v, self.particles.outward)
 
-    def move(self, state: Any) -> None:
+    def move(self, state: StateArrays) -> None:
         """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
         self.flux.rebase(self.of(state).F)
         self.configuration.move(self.of(state))
 
-    def renew(self, state: Any) -> None:
+    def renew(self, state: StateArrays) -> None:
         """Neighbours and corrections of the new reference (M3), and what the options add."""
         self.configuration.renew()
         self.stabilise(state)
 
-    def stabilise(self, state: Any) -> None:
+    def stabilise(self, state: StateArrays) -> None:
         """Prepare the stabiliser for a new reference, and what else depends on it."""
         self.stabiliser.refresh(self.configuration, self.of(state))
         self._derive()
@@ -179,7 +198,7 @@ class Medium:
         if self.smoothed_F_k is not self.configuration.fields.F:
             self._smooth_field(self.configuration.fields.F, self.grad_F, self.smoothed_F_k)
 
-    def shift(self, state: Any) -> None:
+    def shift(self, state: StateArrays) -> None:
         """Shift the particles (M15), where the options say so."""
         if self.shifter is not None:
             U = self.of(state)
@@ -190,22 +209,46 @@ class Medium:
 
     # the lines of a step
 
-    def velocity_gradient(self, state: Any) -> None:
-        """∇_k v (M4, M21)."""
+    def velocity_gradient(self, state: StateArrays, out: wp.array | None = None) -> None:
+        """∇_k v (M4, M21), into ``grad_v`` by default."""
         gradient = self.configuration.gradient if self.sharpener is None else self.sharpener.gradient
-        gradient(self.of(state).v, self.grad_v)
+        gradient(self.of(state).v, self.grad_v if out is None else out)
 
-    def gradients(self, state: Any) -> None:
+    def keep_gradient(self, state: StateArrays) -> None:
+        """∇_k v of a state in which a step begins, where it is kept."""
+        if self.steady:
+            self.velocity_gradient(state, self.kept)
+
+    def known_gradient(self, state: StateArrays) -> None:
+        """∇_k v of the state in which a step begins, that which was kept where it was."""
+        if self.steady:
+            wp.copy(self.grad_v, self.kept)
+        else:
+            self.velocity_gradient(state)
+
+    def mean_gradient(self, state: StateArrays, mean: StateArrays) -> None:
+        """∇_k v of ``mean``; as M4 is linear, where all is steady from ∇_k vⁿ and that of ``state``, which is kept."""
+        if self.steady:
+            self.keep_gradient(state)
+            self._launch(make_mean(self.space, "mat"), self.n, [self.kept, self.grad_v])
+        else:
+            self.velocity_gradient(mean)
+
+    def release(self, state: StateArrays) -> None:
+        """The velocity before conditions are imposed."""
+        wp.copy(self.forces.free_v, self.of(state).v)
+
+    def gradients(self, state: StateArrays) -> None:
         """∇_k v, and ∇_k F where the smoothing needs it (M4)."""
         self.velocity_gradient(state)
         if self.options.smoothing is not None and self.options.smoothing.needs_gradient:
             self.configuration.gradient(self._rows(self.of(state).F), self.grad_F)
 
-    def wave_speeds(self, state: Any) -> None:
+    def wave_speeds(self, state: StateArrays) -> None:
         """Wave speeds, and their largest rate into the clock's."""
         self.flux.wave_speeds(self.of(state).F, self.grad_v, self.configuration, self.clock)
 
-    def sense(self, state: Any) -> None:
+    def sense(self, state: StateArrays) -> None:
         """d of v, and the diffusion of the state (§5)."""
         U = self.of(state)
         for sensor in self.sensors.values():
@@ -213,52 +256,46 @@ class Medium:
         if self.limiter is not None:
             self.limiter.prepare(U, self.sensors[self.limiter.option.sensor].d)
 
-    def stress(self, state: Any, fraction: float) -> None:
+    def stress(self, state: StateArrays, fraction: float) -> None:
         """Q of F (M1), which is ``fraction`` · Δt ahead of the histories."""
         self.flux.compute(self.of(state).F, self.grad_v, self.configuration, self.clock, fraction)
 
-    def sum_forces(self, state: Any, rates: Any) -> None:
+    def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
-        at, v, options = self.of(state), self.of(rates).v, self.options
-        epsilon, d = 0.0, None
-        if options.dissipation is not None:
-            epsilon = options.dissipation.epsilon
-            if options.dissipation.sensor is not None:
-                d = self.sensors[options.dissipation.sensor].d
+        at, v = self.of(state), self.of(rates).v
         if self.pairs is not None:
-            self.pairs.compute(self.configuration, at, v, self.grad_v, epsilon, d, self.forces)
-        arguments = (self.configuration, self.flux.fields, at.x, v, self.grad_v, epsilon, d, self.forces)
-        self.stabiliser.compute(*arguments)
+            self.pairs.compute(self.sums, at, v)
+        self.stabiliser.compute(self.sums, at.x, v)
 
-    def smooth(self, state: Any, out: Any) -> None:
+    def smooth(self, state: StateArrays, out: StateArrays) -> None:
         """S of v and F (M6, M7)."""
         U, half = self.of(state), self.of(out)
         self._smooth_field(U.v, self.grad_v, half.v)
         self._smooth_field(U.F, self.grad_F, half.F)
 
-    def predict(self, state: Any, out: Any, fraction: float) -> None:
+    def predict(self, state: StateArrays, out: StateArrays, fraction: float) -> None:
         """``out``, which is S of ``state``, moved by ``fraction`` · Δt (M8)."""
         arguments = [self.particles, self.of(state), self.smoothed_F_k, self.grad_v, self.forces, self.clock]
         kernel = make_predict(self.space, self.configuration.fixed, self.moves_surfaces)
         self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
 
-    def kick(self, state: Any) -> None:
+    def kick(self, state: StateArrays) -> None:
         """v^{n+1} (M8)."""
         arguments = [self.particles, self.forces, self.clock, self.of(state).v]
         self._launch(make_kick(self.space), self.n, arguments)
 
-    def drift(self, state: Any, rates: Any, fraction: float, out: Any) -> None:
+    def drift(self, state: StateArrays, rates: StateArrays, fraction: float, out: StateArrays) -> None:
         """F and x of ``state`` moved by ``fraction`` · Δt with v of ``rates``, into ``out`` (M8)."""
         arguments = [self.configuration.fields, self.of(state), self.of(rates).v, self.grad_v, self.clock]
         kernel = make_drift(self.space, self.configuration.fixed, self.moves_surfaces)
         self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
 
-    def limit(self, state: Any) -> None:
+    def limit(self, state: StateArrays) -> None:
         """U^{n+1} += d × diffusion (§5)."""
         if self.limiter is not None:
             self.limiter.apply(self.of(state), self.clock)
 
-    def update(self, state: Any) -> None:
+    def update(self, state: StateArrays) -> None:
         """Histories after a full step, and what materials keep of F: liquids J only."""
         self.flux.update(self.of(state).F, self.grad_v, self.configuration, self.clock)
 

@@ -3,7 +3,6 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
@@ -12,10 +11,11 @@ from ..fields import neighbour_structure, structure
 from ..operators.laplacian import LaplacianSolver
 from ..reduce import Sum
 from ..space import Space, difference
+from ..structs import ParticleArrays, StateArrays
 from .dissipation import UpwindForces, blend, upwind
 from .flux import Flux
 from .reference import Configuration
-from .stabiliser import Correction, Stabiliser
+from .stabiliser import Correction, Stabiliser, Sums
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,13 @@ class PairAreas(Correction):
         """Whether M12 limits the correction."""
         return math.isfinite(self.kappa)
 
-    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "ClosedPairs":
+    def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "ClosedPairs":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return ClosedPairs(self, space, particles, flux.bodies, device)
 
 
 @functools.cache
-def _make_remove_mean(space: Space) -> Any:
+def _make_remove_mean(space: Space) -> wp.Kernel:
     real, vec = space.real, space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -61,7 +61,7 @@ def _make_remove_mean(space: Space) -> Any:
 
 
 @functools.cache
-def admitted(space: Space) -> Any:
+def admitted(space: Space) -> wp.Function:
     """``wp.func`` R_a of M12: the share of what it is fed that a particle can pay for, in [0, 1].
 
     Args (of the function): powers [W] that the correction feeds and takes in the particle's pairs, power that the
@@ -80,7 +80,7 @@ def admitted(space: Space) -> Any:
 
 
 @functools.cache
-def _make_dissipate(space: Space, sensed: bool) -> Any:
+def _make_dissipate(space: Space, sensed: bool) -> wp.Kernel:
     """Kernel: M9, and from the powers of M9 and of M11 in the particle's pairs what M12 admits, R_a."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux, Neighbours = structure(space, "Reference"), structure(space, "Flux"), neighbour_structure(space)
@@ -134,7 +134,7 @@ def _make_dissipate(space: Space, sensed: bool) -> Any:
 
 
 @functools.cache
-def _make_correct(space: Space, limited: bool) -> Any:
+def _make_correct(space: Space, limited: bool) -> wp.Kernel:
     """Kernel: the correction ½ Σ_b φ_ab (Q_a + Q_b) c_ab (M11), feeding pairs by φ_ab = min(R_a, R_b) only (M12)."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -167,7 +167,9 @@ def _make_correct(space: Space, limited: bool) -> Any:
 class ClosedPairs(Stabiliser):
     """The pair areas c_ab = ω_ab (ψ_a − ψ_b) of the present reference, and the forces they correct."""
 
-    def __init__(self, option: PairAreas, space: Space, particles: Any, bodies: list[range], device: Any):
+    def __init__(
+        self, option: PairAreas, space: Space, particles: ParticleArrays, bodies: list[range], device: wp.DeviceLike
+    ):
         self.option, self.space, self.bodies, self.device = option, space, bodies, device
         self.upwind, self._launch = UpwindForces(space, device), Launcher(device)
         self.solver = LaplacianSolver(space, len(particles.mass), device)
@@ -177,7 +179,7 @@ class ClosedPairs(Stabiliser):
             wp.zeros(1, dtype=space.vec, device=device),
         )
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Solve for the potentials ψ of the new reference, body by body free of a mean (M11)."""
         defect = self.solver.residual
         configuration.defect(state.surface, defect)
@@ -191,26 +193,17 @@ class ClosedPairs(Stabiliser):
         """The potentials: in use until the next refresh, whose first guess they are."""
         return {"ClosedPairs.psi": self.solver.psi}
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: Any,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: Any,
-    ) -> None:
-        """Internal force (M5), dissipation (M9) and correction (M11, M12) into ``forces``."""
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5), dissipation (M9) and correction (M11, M12)."""
+        configuration, flux, forces = sums.configuration, sums.flux, sums.forces
         if self.option.limited:
             configuration.divergence(flux.Pi, forces.internal)
-            arguments = [configuration.fields, configuration.near, flux, x, v, grad_v, epsilon]
-            arguments += [sensor if sensor is not None else v, self.solver.psi, self.option.kappa]
+            arguments = [configuration.fields, configuration.near, flux, x, v, sums.grad_v, sums.epsilon]
+            arguments += [sums.sensor if sums.sensor is not None else v, self.solver.psi, self.option.kappa]
             arguments += [forces.dissipation, self.admission]
-            self._launch(_make_dissipate(self.space, sensor is not None), len(v), arguments)
+            self._launch(_make_dissipate(self.space, sums.sensor is not None), len(v), arguments)
         else:
-            self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
+            self.upwind.compute(sums, x, v)
         arguments = [configuration.fields, configuration.near, flux.Q, v, self.solver.psi, self.admission]
         arguments += [forces.correction]
         self._launch(_make_correct(self.space, self.option.limited), len(v), arguments)

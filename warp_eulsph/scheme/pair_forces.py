@@ -1,7 +1,6 @@
 """Internal force (M5) and dissipation (M9) in one SIMD pass over the neighbours, on the CPU."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -9,6 +8,7 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..simd import BY_EIGHT, OWN_ROW, packed_rows, prelude
 from ..space import Space
+from ..structs import FluxArrays, ForceArrays
 from .reference import Configuration
 
 #: C++ of what an upwind flux (M9) asks of eight pairs: |ξ|² of X, |n|² of N, the pairs as they are now (1 where there
@@ -31,7 +31,7 @@ def _vectors(space: Space) -> int:
 
 
 @functools.cache
-def _make_pack(space: Space) -> Any:
+def _make_pack(space: Space) -> wp.Kernel:
     """Kernel: what the pass reads of a neighbour, side by side; Π = Q Lᵀ (M5) is made here."""
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
@@ -65,7 +65,7 @@ def _make_pack(space: Space) -> Any:
 
 
 @functools.cache
-def _make_forces(space: Space) -> Any:
+def _make_forces(space: Space) -> wp.Kernel:
     """Kernel: M5 and M9 from packed rows."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -103,7 +103,7 @@ def _make_forces(space: Space) -> Any:
         const V normal = along * (Z - Z_shear) * (wr / nn), shear = Z_shear * wr;
         #pragma unroll
         for (int j = 0; j < dim; ++j) dissipation[j] += N[j] * normal + J[j] * shear;
-        // apart, so that few vectors are alive at a time: the stack is not aligned to them, spills cost up to a half
+        // apart, so that few vectors are alive at a time and few are spilled
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
             const Q* const B = all + (size_t)b[i] * vectors;
@@ -158,19 +158,19 @@ def _make_forces(space: Space) -> Any:
 class PairForces:
     """The pass at work on n particles."""
 
-    def __init__(self, space: Space, n: int, device: Any):
+    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
         self.space, self._launch = space, Launcher(device)
         self._rows = packed_rows(space, n, _vectors(space), device)
 
     def compute(
         self,
         configuration: Configuration,
-        flux: Any,
+        flux: FluxArrays,
         x: wp.array,
         v: wp.array,
         grad_v: wp.array,
         epsilon: float,
-        forces: Any,
+        forces: ForceArrays,
     ) -> None:
         """``forces.internal`` (M5) and ``forces.dissipation`` (M9 without a sensor) [N]."""
         n = len(v)

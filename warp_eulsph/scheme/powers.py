@@ -1,7 +1,6 @@
 """What the ledger asks of a particle in a step: work and power in float64, as ``wp.func``."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -10,7 +9,7 @@ from ..space import Space, matrix_type, vector_type
 
 
 @functools.cache
-def loads_power(space: Space, damped: bool) -> Any:
+def loads_power(space: Space, damped: bool) -> wp.Function:
     """``wp.func`` (power of the loads on a particle at velocity v, power of what damps among them) [W]."""
     Forces, precise = structure(space, "Forces"), vector_type(space.dim, wp.float64)
 
@@ -26,7 +25,7 @@ def loads_power(space: Space, damped: bool) -> Any:
 
 
 @functools.cache
-def note(space: Space) -> Any:
+def note(space: Space) -> wp.Function:
     """``wp.func``: keep the end of a step as the start of the next."""
     vec, State, wide = space.vec, structure(space, "State"), wp.float64
 
@@ -39,7 +38,7 @@ def note(space: Space) -> Any:
 
 
 @functools.cache
-def lost(space: Space, inelastic: bool) -> Any:
+def lost(space: Space, inelastic: bool) -> wp.Function:
     """``wp.func``: energy that the law of a particle dissipated in the step, 0 where none does."""
     Flux = structure(space, "Flux")
 
@@ -53,7 +52,21 @@ def lost(space: Space, inelastic: bool) -> Any:
 
 
 @functools.cache
-def powers(space: Space, tied: bool, dragged: bool) -> Any:
+def slipped(space: Space, yielding: bool) -> wp.Function:
+    """``wp.func``: energy that a tie lost by yielding in the step (M16), 0 where none does."""
+    Flux = structure(space, "Flux")
+
+    @wp.func
+    def slipped(a: int, flux: Flux) -> wp.float64:
+        if wp.static(yielding):
+            return wp.float64(flux.slipped[a])
+        return wp.float64(0.0)
+
+    return slipped
+
+
+@functools.cache
+def powers(space: Space, tied: bool, dragged: bool) -> wp.Function:
     """``wp.func``: power [W] of the stresses in Q of a particle that are the tie's and the dissipation's."""
     Flux, precise_mat = structure(space, "Flux"), matrix_type(space.dim, space.dim, wp.float64)
 
@@ -70,7 +83,7 @@ def powers(space: Space, tied: bool, dragged: bool) -> Any:
 
 
 @functools.cache
-def work(space: Space) -> Any:
+def work(space: Space) -> wp.Function:
     """``wp.func``: force · velocity in float64."""
     vec, precise = space.vec, vector_type(space.dim, wp.float64)
 

@@ -1,7 +1,6 @@
 """Net force and torque taken off a body by the mass-weighted least change."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -9,13 +8,14 @@ from ..execution import Launcher
 from ..fields import structure
 from ..reduce import Sum
 from ..space import Space
+from ..structs import ParticleArrays
 
 # Sums of one body about the origin, padded to 3-D: force, torque, m x, m, inertia (xx, yy, zz, xy, yz, zx).
 _Sums = wp.types.vector(length=16, dtype=wp.float64)
 
 
 @functools.cache
-def pad(space: Space) -> Any:
+def pad(space: Space) -> wp.Function:
     """``wp.func`` vec -> its 3-D vector in float64."""
     vec, dim = space.vec, space.dim
 
@@ -30,7 +30,7 @@ def pad(space: Space) -> Any:
 
 
 @functools.cache
-def _make_sums(space: Space) -> Any:
+def _make_sums(space: Space) -> wp.Kernel:
     """Kernel: each particle's share in the sums of its body; ghosts have none."""
     vec, Particles, padded = space.vec, structure(space, "Particles"), pad(space)
 
@@ -63,7 +63,7 @@ def _make_sums(space: Space) -> Any:
 
 
 @functools.cache
-def _make_project(space: Space) -> Any:
+def _make_project(space: Space) -> wp.Kernel:
     """Kernel: f_a ← f_a − m_a (α + ω × x_a) with α, ω such that the body's force and torque vanish.
 
     In a periodic box, where there is no angular momentum to keep, α alone.
@@ -108,7 +108,7 @@ class Projection:
         couples: torques [N m] of the particles about themselves, (n,) of vec3d, zero unless written.
     """
 
-    def __init__(self, space: Space, particles: Any, bodies: list[range], device: Any):
+    def __init__(self, space: Space, particles: ParticleArrays, bodies: list[range], device: wp.DeviceLike):
         n, self._launch = len(particles.mass), Launcher(device)
         self.space, self.particles, self.bodies, self.device = space, particles, bodies, device
         self.couples = wp.zeros(n, dtype=wp.vec3d, device=device)

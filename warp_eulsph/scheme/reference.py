@@ -1,7 +1,7 @@
 """The reference configuration k: positions, volumes, corrections and neighbour lists in which weights live."""
 
 import functools
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import warp as wp
@@ -17,6 +17,7 @@ from ..operators.interpolation import Interpolation
 from ..operators.neighbours import NeighbourLists
 from ..operators.values import Values
 from ..space import Space, difference
+from ..structs import NeighbourRows, ParticleArrays, ReferenceArrays, StateArrays
 from ..weights import Weight
 from .refresh import BY_HOST
 from .tilt import Tilt, make_tilt, make_tilted_sums
@@ -26,7 +27,7 @@ LEAST_GROWTH, LARGEST_GROWTH = 0.5, 2.0
 
 
 @functools.cache
-def _make_adopt(space: Space, fixed: bool) -> Any:
+def _make_adopt(space: Space, fixed: bool) -> wp.Kernel:
     State, Particles, Reference = (
         structure(space, "State"),
         structure(space, "Particles"),
@@ -59,7 +60,7 @@ STEEPER = 1.2
 
 
 @functools.cache
-def reference_spacing(space: Space) -> Any:
+def reference_spacing(space: Space) -> wp.Function:
     """``wp.func`` spacing of particle a in the reference [m], which follows its smoothing length."""
     real, Particles, Reference = space.real, structure(space, "Particles"), structure(space, "Reference")
 
@@ -71,7 +72,7 @@ def reference_spacing(space: Space) -> Any:
 
 
 @functools.cache
-def resolution(space: Space) -> Any:
+def resolution(space: Space) -> wp.Function:
     """``wp.func`` of particle a what the Courant number counts by [1/m]: 1/spacing, more where L is large."""
     real, bounds, spacing_of = space.real, symmetric_bounds(space), reference_spacing(space)
     Particles, Reference = structure(space, "Particles"), structure(space, "Reference")
@@ -86,7 +87,7 @@ def resolution(space: Space) -> Any:
 
 
 @functools.cache
-def _make_resolve(space: Space) -> Any:
+def _make_resolve(space: Space) -> wp.Kernel:
     """Kernel: ``resolution`` of a fixed reference, ``steeper`` times."""
     real, Particles, Reference = space.real, structure(space, "Particles"), structure(space, "Reference")
     resolution_of = resolution(space)
@@ -100,7 +101,7 @@ def _make_resolve(space: Space) -> Any:
 
 
 @functools.cache
-def _make_distortion(space: Space) -> Any:
+def _make_distortion(space: Space) -> wp.Kernel:
     real, mat = space.real, space.mat
     Reference = structure(space, "Reference")
     invert, bounds, shortening_of = inverse(space), stretch_bounds(space), largest_shortening(space)
@@ -116,7 +117,7 @@ def _make_distortion(space: Space) -> Any:
 
 
 @functools.cache
-def _make_nearest(space: Space) -> Any:
+def _make_nearest(space: Space) -> wp.Kernel:
     real = space.real
     Reference, Neighbours, separation = structure(space, "Reference"), neighbour_structure(space), difference(space)
 
@@ -132,7 +133,7 @@ def _make_nearest(space: Space) -> Any:
 
 
 @functools.cache
-def _make_defect(space: Space) -> Any:
+def _make_defect(space: Space) -> wp.Kernel:
     """Kernel: e_a − s_a from −e_a."""
     vec = space.vec
 
@@ -166,9 +167,9 @@ class Configuration:
         self,
         space: Space,
         weight: Weight,
-        particles: Any,
-        box: Any,
-        device: Any,
+        particles: ParticleArrays,
+        box: Sequence[float],
+        device: wp.DeviceLike,
         *,
         fixed: bool = False,
         corrected: bool = True,
@@ -182,7 +183,7 @@ class Configuration:
         self._steeper = STEEPER if self.sharpened else 1.0
         self.simd, self._launch = simd(device), Launcher(device)
         empty = {"F" if fixed else "resolution"} | (set() if self.tilt else {"moment"})
-        self.fields = allocate(space, "Reference", n, device, empty=empty)
+        self.fields: ReferenceArrays = allocate(space, "Reference", n, device, empty=empty)
         if self.plain:
             self.fields.balanced = self.fields.x
         tilted = self.tilt is not None
@@ -193,15 +194,19 @@ class Configuration:
         self._interpolations: dict[Values, Interpolation] = {}
 
     @property
-    def near(self) -> Any:
+    def near(self) -> NeighbourRows:
         """Struct of the neighbour rows."""
         return self.lists.rows
 
-    def refresh(self, state: Any) -> None:
+    def pairs_by_simd(self, sensed: bool) -> bool:
+        """Whether passes over pairs run by SIMD kernels, which know of no sensor; else by the portable ones."""
+        return self.simd and not sensed
+
+    def refresh(self, state: StateArrays) -> None:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
         BY_HOST(lambda: self.move(state), [self.lists], self.renew)
 
-    def move(self, state: Any) -> None:
+    def move(self, state: StateArrays) -> None:
         """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
         self._launch(_make_adopt(self.space, self.fixed), len(self.K), [state, self.particles, self.fields])
         self.lists.count_neighbours(self.fields.x)

@@ -15,6 +15,7 @@ from ..execution import Launcher
 from ..fields import allocate, structure
 from ..order import Order
 from ..space import Space
+from ..structs import ParticleArrays
 from ..turns import in_turn
 from ..weights import CubicSpline, Weight
 from .reference import Configuration
@@ -84,7 +85,7 @@ class TwoStepLaxWendroff(ScalarScheme):
 
 
 @functools.cache
-def _linear_flux(space: Space, velocity: tuple[float, ...]) -> Any:
+def _linear_flux(space: Space, velocity: tuple[float, ...]) -> wp.Function:
     """``wp.func`` U -> a U."""
     real, vec, dim = space.real, space.vec, space.dim
     a = vec(*velocity)
@@ -100,7 +101,7 @@ def _linear_flux(space: Space, velocity: tuple[float, ...]) -> Any:
 
 
 @functools.cache
-def _make_flux(space: Space, function: Any) -> Any:
+def _make_flux(space: Space, function: Any) -> wp.Kernel:
     """Kernel: f(U_a)."""
     vec, row = space.vec, space.row(1)
 
@@ -113,7 +114,7 @@ def _make_flux(space: Space, function: Any) -> Any:
 
 
 @functools.cache
-def _make_advance(space: Space) -> Any:
+def _make_advance(space: Space) -> wp.Kernel:
     """Kernel: out = base − Δt ∇·f."""
     real, mat, row = space.real, space.mat, space.row(1)
 
@@ -126,7 +127,7 @@ def _make_advance(space: Space) -> Any:
 
 
 @functools.cache
-def _make_hold(space: Space) -> Any:
+def _make_hold(space: Space) -> wp.Kernel:
     row = space.row(1)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -175,7 +176,7 @@ class ConservationLaw:
         periodic: Sequence[float] | None = None,
         held: Region | None = None,
         dtype: type = wp.float64,
-        device: Any = None,
+        device: wp.DeviceLike = None,
     ):
         x = np.asarray(x, dtype=float)
         if x.ndim != 2 or x.shape[1] not in (1, 2, 3):
@@ -194,7 +195,7 @@ class ConservationLaw:
         if not (volume > 0.0).all():
             raise ValueError(f"volumes must be positive, got a least one of {volume.min()} m^{dim}")
         spacing = volume ** (1.0 / dim)
-        particles = allocate(space, "Particles", n, self.device)
+        particles: ParticleArrays = allocate(space, "Particles", n, self.device)
         for field, values in (("mass", volume), ("V0", volume), ("h", dilation * spacing), ("spacing", spacing)):
             getattr(particles, field).assign(values)
         state = structure(space, "State")()

@@ -4,7 +4,7 @@ import functools
 import math
 from abc import ABC
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import warp as wp
 
@@ -12,6 +12,7 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..operators.second_derivative import make_second_derivative
 from ..space import Space
+from ..structs import FluxArrays, ParticleArrays
 from .reference import Configuration
 
 
@@ -55,7 +56,7 @@ class DimensionlessSensor(Sensor):
 
 
 @functools.cache
-def modulation(space: Space, dimensionless: bool) -> Any:
+def modulation(space: Space, dimensionless: bool) -> wp.Function:
     """``wp.func`` d in [0, 1] from X, |∇²v_i| [1/(m s)], h [m] and c [m/s]."""
     real = space.real
 
@@ -75,7 +76,7 @@ def modulation(space: Space, dimensionless: bool) -> Any:
 
 
 @functools.cache
-def _make_sense(space: Space, dimensionless: bool) -> Any:
+def _make_sense(space: Space, dimensionless: bool) -> wp.Kernel:
     """Kernel: d_a from the largest |∇²v| of a and its neighbours, direction by direction."""
     real, vec, dim = space.real, space.vec, space.dim
     Reference, Flux, Neighbours = structure(space, "Reference"), structure(space, "Flux"), neighbour_structure(space)
@@ -110,12 +111,12 @@ class SensorField:
         d: (n,) of vec in [0, 1].
     """
 
-    def __init__(self, option: Sensor, space: Space, particles: Any, device: Any):
+    def __init__(self, option: Sensor, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
         self.option, self.space, self.device, n = option, space, device, len(particles.mass)
         self._launch = Launcher(device)
         self.d, self._curvature = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(2))
 
-    def compute(self, configuration: Configuration, flux: Any, v: wp.array, grad_v: wp.array) -> None:
+    def compute(self, configuration: Configuration, flux: FluxArrays, v: wp.array, grad_v: wp.array) -> None:
         """``d`` of velocities ``v`` [m/s] with gradients ``grad_v`` [1/s] and the wave speeds in ``flux``."""
         second = [configuration.fields, configuration.near, v, grad_v, self._curvature]
         self._launch(make_second_derivative(self.space, self.space.dim), len(v), second)

@@ -2,7 +2,6 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -35,7 +34,7 @@ SHARE = 1.0 / 3.0
 
 
 @functools.cache
-def turned_sum(space: Space, simd: bool, dual: bool) -> Any:
+def turned_sum(space: Space, simd: bool, dual: bool) -> wp.Function:
     """``wp.func`` (a, near, rows, x) -> Σ_b w (R_b ξ) ⊗ ξ, R_b a matrix in packed rows with x; w own or ``dual`` (M17).
 
     Rows hold the columns of R, each with a coordinate of x beside it (``pack_columns``).
@@ -127,7 +126,7 @@ def turned_sum(space: Space, simd: bool, dual: bool) -> Any:
 
 
 @functools.cache
-def pack_columns(space: Space) -> Any:
+def pack_columns(space: Space) -> wp.Function:
     """``wp.func`` (a, R, x, rows): columns of a matrix, each with a coordinate of x beside it, into row a."""
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
 
@@ -142,7 +141,7 @@ def pack_columns(space: Space) -> Any:
 
 
 @functools.cache
-def make_pack(space: Space) -> Any:
+def make_pack(space: Space) -> wp.Kernel:
     """Kernel: Π = Q Lᵀ (M5) into packed rows."""
     real, mat, pack_matrix = space.real, space.mat, pack_columns(space)
     Reference = structure(space, "Reference")
@@ -156,7 +155,7 @@ def make_pack(space: Space) -> Any:
 
 
 @functools.cache
-def _make_gradient(space: Space, simd: bool) -> Any:
+def _make_gradient(space: Space, simd: bool) -> wp.Kernel:
     """Kernel: ∇f (M4) into packed rows."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -173,7 +172,7 @@ def _make_gradient(space: Space, simd: bool) -> Any:
 
 
 @functools.cache
-def _make_sharpen(space: Space, simd: bool) -> Any:
+def _make_sharpen(space: Space, simd: bool) -> wp.Kernel:
     """Kernel: ∇̃f of ∇f in packed rows (M21)."""
     real, mat, dim = space.real, space.mat, space.dim
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -195,7 +194,7 @@ def _make_sharpen(space: Space, simd: bool) -> Any:
 
 
 @functools.cache
-def _make_stress(space: Space, simd: bool) -> Any:
+def _make_stress(space: Space, simd: bool) -> wp.Kernel:
     """Kernel: Π̃ = Q̃ Lᵀ with Q̃ = Q + ⅓ (Q − Σ_b V_b g_ba (Π_b ξ) ⊗ ξ), the adjoint of ∇̃ (M21).
 
     Into packed rows with ``simd``, into an array without.
@@ -232,7 +231,7 @@ class Sharpener:
         stress_rows: Π̃ in packed rows, after ``stress``; empty without SIMD kernels.
     """
 
-    def __init__(self, space: Space, configuration: Configuration, n: int, device: Any):
+    def __init__(self, space: Space, configuration: Configuration, n: int, device: wp.DeviceLike):
         self.space, self.configuration, self._launch = space, configuration, Launcher(device)
         self._rows = packed_rows(space, n, space.dim, device)
         self.stress_rows = packed_rows(space, n if configuration.simd else 0, space.dim, device)

@@ -3,7 +3,6 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -12,6 +11,7 @@ from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
+from ..structs import ClockArrays, ParticleArrays, StateArrays
 from .flux import Flux, Part
 from .health import WELL
 from .projection import Projection, pad
@@ -49,13 +49,15 @@ class Shifting:
                 f"shifting bound must be in (0, 0.25] spacings, got {self.bound}; 0.05 is the tested value"
             )
 
-    def build(self, space: Space, particles: Any, flux: Flux, held: np.ndarray, device: Any) -> "Shifter":
+    def build(
+        self, space: Space, particles: ParticleArrays, flux: Flux, held: np.ndarray, device: wp.DeviceLike
+    ) -> "Shifter":
         """Allocate; ``held`` are places of particles that stay, (k,)."""
         return Shifter(self, space, particles, flux, held, device)
 
 
 @functools.cache
-def _make_shift(space: Space) -> Any:
+def _make_shift(space: Space) -> wp.Kernel:
     """Kernel: x += G δ, F += ∇_k F · δ, impulse m ∇_k v · δ and its couple, δ = ½ rate ψ in the reference (M15), kept.
 
     Nothing moves once the target time is reached or the run has failed.
@@ -114,7 +116,7 @@ def _make_shift(space: Space) -> Any:
 
 
 @functools.cache
-def _make_push(space: Space) -> Any:
+def _make_push(space: Space) -> wp.Kernel:
     """Kernel: v += impulse / m."""
     vec, Particles = space.vec, structure(space, "Particles")
 
@@ -127,7 +129,7 @@ def _make_push(space: Space) -> Any:
 
 
 @functools.cache
-def _make_remap(space: Space, size: int, least: tuple[float, ...]) -> Any:
+def _make_remap(space: Space, size: int, least: tuple[float, ...]) -> wp.Kernel:
     """Kernel: h += ∇_k h · δ, not below ``least``."""
     real, vec, row, gradients = space.real, space.vec, space.row(size), space.row_gradient(size)
     bound = row(*least)
@@ -151,7 +153,7 @@ def _make_remap(space: Space, size: int, least: tuple[float, ...]) -> Any:
 class Remap:
     """M15 for the history of one body, whose rows are copied among those of all particles for their gradient."""
 
-    def __init__(self, space: Space, part: Part, n: int, device: Any):
+    def __init__(self, space: Space, part: Part, n: int, device: wp.DeviceLike):
         self.part, self.space, self._launch = part, space, Launcher(device)
         size = len(part.law.start)
         self._rows = wp.zeros(n, dtype=space.row(size), device=device)
@@ -174,10 +176,10 @@ class Shifter:
         self,
         option: Shifting,
         space: Space,
-        particles: Any,
+        particles: ParticleArrays,
         flux: Flux,
         held: np.ndarray,
-        device: Any,
+        device: wp.DeviceLike,
     ):
         self.option, self.space, self.particles, self.device = option, space, particles, device
         n, self._launch = len(particles.mass), Launcher(device)
@@ -194,7 +196,13 @@ class Shifter:
         return {"Shifter.free": self.free}
 
     def apply(
-        self, configuration: Configuration, psi: wp.array, U: Any, grad_v: wp.array, grad_F: wp.array, clock: Any
+        self,
+        configuration: Configuration,
+        psi: wp.array,
+        U: StateArrays,
+        grad_v: wp.array,
+        grad_F: wp.array,
+        clock: ClockArrays,
     ) -> None:
         """Shift the particles of ``U``, whose gradients in the reference are given; ψ [m] are its potentials (M13)."""
         option, n, reference = self.option, len(psi), configuration.fields

@@ -1,11 +1,13 @@
 """What keeps the sums of a reference stable: dissipation, and the correction of what the arrangement gets wrong."""
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import warp as wp
 
 from ..space import Space
+from ..structs import FluxArrays, ForceArrays, ParticleArrays, StateArrays
 from .flux import Flux
 from .reference import Configuration
 
@@ -19,8 +21,29 @@ class Correction(ABC):
     has_potentials: ClassVar[bool] = False
 
     @abstractmethod
-    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "Stabiliser":
+    def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "Stabiliser":
         """Allocate for the bodies of ``flux``."""
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What the forces on a medium are summed from, and where they go.
+
+    Attributes:
+        configuration: its reference k.
+        flux: stress and impedances.
+        grad_v: ∇_k v [1/s] (M4), (n,) of mat.
+        forces: written.
+        epsilon: share of the upwind flux (M9), 0 where nothing dissipates.
+        sensor: (n,) of vec in [0, 1] that switches M9 to first order; None without.
+    """
+
+    configuration: Configuration
+    flux: FluxArrays
+    grad_v: wp.array
+    forces: ForceArrays
+    epsilon: float = 0.0
+    sensor: wp.array | None = None
 
 
 class Stabiliser(ABC):
@@ -32,7 +55,7 @@ class Stabiliser(ABC):
     psi: wp.array
 
     @abstractmethod
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Prepare for a new reference."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
@@ -44,15 +67,5 @@ class Stabiliser(ABC):
         return {}
 
     @abstractmethod
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: Any,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: Any,
-    ) -> None:
-        """Internal force (M5), dissipation (M9, ε, switched by ``sensor``, at x and v) and correction [N]."""
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5), dissipation (M9, at x and v) and correction [N], into ``sums.forces``."""

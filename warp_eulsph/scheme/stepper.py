@@ -1,10 +1,8 @@
 """A scheme at work: the lines of which its step is made, each over the media of the world."""
 
 from abc import ABC, abstractmethod
-from typing import Any
 
-import warp as wp
-
+from ..structs import StateArrays
 from .base import Scheme
 from .health import check
 from .updates import make_add
@@ -40,15 +38,23 @@ class Stepper(World, ABC):
     def advance(self) -> None:
         """Advance U on the present references, and tick; launches only."""
 
-    def _velocity_gradient(self, state: Any) -> None:
+    def _velocity_gradient(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.velocity_gradient(state)
 
-    def _gradients(self, state: Any) -> None:
+    def _known_gradient(self, state: StateArrays) -> None:
+        for medium in self.media:
+            medium.known_gradient(state)
+
+    def _mean_gradient(self, state: StateArrays, mean: StateArrays) -> None:
+        for medium in self.media:
+            medium.mean_gradient(state, mean)
+
+    def _gradients(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.gradients(state)
 
-    def _choose_dt(self, state: Any) -> None:
+    def _choose_dt(self, state: StateArrays) -> None:
         self.clock.ask()
         for medium in self.media:
             medium.wave_speeds(state)
@@ -61,15 +67,15 @@ class Stepper(World, ABC):
                 self.clock.add()
         self.clock.choose()
 
-    def _sense(self, state: Any) -> None:
+    def _sense(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.sense(state)
 
-    def _stress(self, state: Any, fraction: float) -> None:
+    def _stress(self, state: StateArrays, fraction: float) -> None:
         for medium in self.media:
             medium.stress(state, fraction)
 
-    def _sum_forces(self, state: Any, rates: Any, fraction: float) -> None:
+    def _sum_forces(self, state: StateArrays, rates: StateArrays, fraction: float) -> None:
         for medium in self.media:
             medium.sum_forces(state, rates)
         if self.loaded:
@@ -85,34 +91,36 @@ class Stepper(World, ABC):
             interaction.forces(self, state, fraction, exchanged)
             self._launch(make_add(self.space), self.n, [exchanged, self.forces.external])
 
-    def _smooth(self, state: Any, out: Any) -> None:
+    def _smooth(self, state: StateArrays, out: StateArrays) -> None:
         for medium in self.media:
             medium.smooth(state, out)
 
-    def _predict(self, state: Any, out: Any, fraction: float) -> None:
+    def _predict(self, state: StateArrays, out: StateArrays, fraction: float) -> None:
         for medium in self.media:
             medium.predict(state, out, fraction)
 
-    def _kick(self, state: Any) -> None:
+    def _kick(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.kick(state)
 
-    def _drift(self, state: Any, rates: Any, fraction: float, out: Any) -> None:
+    def _drift(self, state: StateArrays, rates: StateArrays, fraction: float, out: StateArrays) -> None:
         for medium in self.media:
             medium.drift(state, rates, fraction, out)
 
-    def _limit(self, state: Any) -> None:
+    def _limit(self, state: StateArrays) -> None:
         self.ledger.open_limiter(state)
         for medium in self.media:
             medium.limit(state)
         self.ledger.close_limiter(state)
 
-    def _release(self, state: Any) -> None:
-        wp.copy(self.forces.free_v, state.v)
+    def _release(self, state: StateArrays, steady: bool | None = None) -> None:
+        for medium in self.media:
+            if steady in (None, medium.steady):
+                medium.release(state)
 
-    def _update(self, state: Any) -> None:
+    def _update(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.update(state)
 
-    def _check(self, state: Any) -> None:
+    def _check(self, state: StateArrays) -> None:
         check(self._launch, self.space, state, self.clock.fields)

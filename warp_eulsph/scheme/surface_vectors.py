@@ -2,17 +2,17 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
+from ..structs import ParticleArrays, StateArrays
 from .dissipation import UpwindForces
 from .flux import Flux
 from .projection import Projection
 from .reference import Configuration
-from .stabiliser import Correction, Stabiliser
+from .stabiliser import Correction, Stabiliser, Sums
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,13 @@ class SurfaceVectors(Correction):
     project: bool = False
     per_body = True
 
-    def build(self, space: Space, particles: Any, flux: Flux, device: Any) -> "SurfaceForces":
+    def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "SurfaceForces":
         """Allocate for the bodies of ``flux``, each a range of particles."""
         return SurfaceForces(self, space, particles, flux.bodies, device)
 
 
 @functools.cache
-def _make_correction(space: Space) -> Any:
+def _make_correction(space: Space) -> wp.Kernel:
     """Kernel: the correction force Q_a (e_a − s_a)."""
     vec, mat = space.vec, space.mat
 
@@ -48,13 +48,20 @@ def _make_correction(space: Space) -> Any:
 class SurfaceForces(Stabiliser):
     """M9 and M10 at work."""
 
-    def __init__(self, option: SurfaceVectors, space: Space, particles: Any, bodies: list[range], device: Any):
+    def __init__(
+        self,
+        option: SurfaceVectors,
+        space: Space,
+        particles: ParticleArrays,
+        bodies: list[range],
+        device: wp.DeviceLike,
+    ):
         self.space, self.device = space, device
         self.upwind, self._launch = UpwindForces(space, device), Launcher(device)
         self.defect = wp.zeros(len(particles.mass), dtype=space.vec, device=device)
         self.projection = Projection(space, particles, bodies, device) if option.project else None
 
-    def refresh(self, configuration: Configuration, state: Any) -> None:
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """The defect e_a − s_a of the new reference."""
         configuration.defect(state.surface, self.defect)
 
@@ -66,20 +73,10 @@ class SurfaceForces(Stabiliser):
         """The defect: of the surface vectors at the last refresh, which are not kept."""
         return {"SurfaceForces.defect": self.defect}
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: Any,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: Any,
-    ) -> None:
-        """Internal force (M5), dissipation (M9) and correction (M10) into ``forces``."""
-        self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
-        arguments = [flux.Q, self.defect, forces.correction]
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5), dissipation (M9) and correction (M10)."""
+        self.upwind.compute(sums, x, v)
+        arguments = [sums.flux.Q, self.defect, sums.forces.correction]
         self._launch(_make_correction(self.space), len(v), arguments)
         if self.projection is not None:
-            self.projection(configuration.fields.x, forces.correction)
+            self.projection(sums.configuration.fields.x, sums.forces.correction)

@@ -3,7 +3,6 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -43,7 +42,7 @@ ROUNDS, HALVINGS = 12, 40
 
 
 @functools.cache
-def _within(space: Space) -> Any:
+def _within(space: Space) -> wp.Function:
     """``wp.func`` (H, r, most) -> the μ with |μ| ≤ most that minimises ½ μ·H μ − r·μ, H positive semi-definite.
 
     (H + λ) μ = r with the multiplier λ ≥ 0 of the bound, found by bisection.
@@ -74,7 +73,7 @@ def _within(space: Space) -> Any:
 
 
 @functools.cache
-def make_tilt(space: Space) -> Any:
+def make_tilt(space: Space) -> wp.Kernel:
     """Kernel: μ_a/dx [1/m], which minimises Φ(μ) = Σ_b w_ab |ξ|² exp(−μ·ξ/dx), convex, within |μ| ≤ ``most``.
 
     The slope of Φ is the third moment Σ_b w_ab t_ab |ξ|² ξ of the tilted weights. By Newton's method on ln Φ. Zero
@@ -122,7 +121,7 @@ def make_tilt(space: Space) -> Any:
 
 
 @functools.cache
-def make_tilted_sums(space: Space) -> Any:
+def make_tilted_sums(space: Space) -> wp.Kernel:
     """Kernel: the weights with t_ab and t_ba, L_a, Σ own ξ, and the graph Laplacian's diagonal.
 
     ``near.own`` ← w_ab t_ab and ``near.w`` ← ½ w_ab (t_ab + t_ba), both from ``near.w`` = w_ab.

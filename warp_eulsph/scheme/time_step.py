@@ -3,13 +3,13 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
+from ..structs import ClockArrays
 from .health import WELL
 
 
@@ -45,7 +45,7 @@ EVEN = 32.0
 
 
 @functools.cache
-def _make_choose(space: Space) -> Any:
+def _make_choose(space: Space) -> wp.Kernel:
     Clock = clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -75,7 +75,7 @@ def _make_choose(space: Space) -> Any:
 
 
 @functools.cache
-def _make_tick(space: Space) -> Any:
+def _make_tick(space: Space) -> wp.Kernel:
     Clock = clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -93,7 +93,7 @@ def _make_tick(space: Space) -> Any:
 
 
 @functools.cache
-def _make_add(space: Space) -> Any:
+def _make_add(space: Space) -> wp.Kernel:
     Clock, real = clock_structure(space), space.real
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -106,7 +106,7 @@ def _make_add(space: Space) -> Any:
 
 
 @functools.cache
-def _make_open(space: Space) -> Any:
+def _make_open(space: Space) -> wp.Kernel:
     Clock = clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -123,11 +123,11 @@ class DeviceClock:
     ``cfl`` is the scheme's own Courant number, for options that leave it open.
     """
 
-    def __init__(self, space: Space, option: TimeStep, cfl: float, device: Any):
+    def __init__(self, space: Space, option: TimeStep, cfl: float, device: wp.DeviceLike):
         self.space, self.option, self.device = space, option, device
         self._launch = Launcher(device)
         self.cfl = cfl if option.cfl is None else option.cfl
-        self.fields = clock_structure(space)()
+        self.fields: ClockArrays = clock_structure(space)()
         for name in ("t", "dt", "free_dt", "longest_dt", "target", "added"):
             setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
         self.fields.rate, self.fields.frequency = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))

@@ -2,12 +2,11 @@
 
 Where positions and F agree, ξ = ½ (F_a + F_b) ξ⁰, a rotation v = Ω x is reconstructed by ∇v ξ⁰ alone. What is left
 over, r = ξ − ½ (F_a + F_b) ξ⁰ (M16), turns too: its velocity Ω r belongs to the reconstruction. From an eighth of the
-pair's length on less of it is counted, from a quarter on nothing: positions say nothing of the pair there, and waves would
-grow by it (``tests/test_stability_map.py``).
+pair's length on less of it is counted, from a quarter on nothing: positions say nothing of the pair there, and waves
+would grow by it (``tests/test_stability_map.py``).
 """
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -15,7 +14,7 @@ from ..space import Space, vector_type
 
 
 @functools.cache
-def make_spin(space: Space) -> Any:
+def make_spin(space: Space) -> wp.Function:
     """``wp.func`` ω of the antisymmetric part W of a velocity gradient, W r = ω × r, in three dimensions."""
     real, mat, dim, vec3 = space.real, space.mat, space.dim, vector_type(3, space.real)
 
@@ -33,7 +32,7 @@ def make_spin(space: Space) -> Any:
 
 
 @functools.cache
-def make_turned(space: Space) -> Any:
+def make_turned(space: Space) -> wp.Function:
     """``wp.func`` (ω, r, pair) -> ω × r, for ``pair`` of what length, less where r is long beside it."""
     real, vec, dim, vec3 = space.real, space.vec, space.dim, vector_type(3, space.real)
 
@@ -54,9 +53,12 @@ def make_turned(space: Space) -> Any:
 
 
 _FADE = """
-        const V off = {off}, pair = ({pair}) + T(1e-30);
-        V share = T(2) - T(8) * __builtin_elementwise_sqrt(off / pair);
-        share = share > 1 ? (V)1 : (share < 0 ? (V)0 : share);
+        const V off = {off}, pair = {pair};
+        V share = 1;  // of nearly all pairs, which need neither root nor quotient
+        if (__builtin_reduce_or(off * 64 > pair)) {{
+            share = T(2) - T(8) * __builtin_elementwise_sqrt(off / (pair + T(1e-30)));
+            share = share > 1 ? (V)1 : (share < 0 ? (V)0 : share);
+        }}
 """
 #: C++ of the same for eight pairs, of −½ ω in S, added to the jumps J.
 TURNING = {

@@ -1,17 +1,16 @@
 """The updates of a step: momentum, deformation gradient, positions and surface vectors (M8)."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
-from ..fields import clock_structure, structure
+from ..fields import clock_structure, element, structure
 from ..linalg import cofactor, det
 from ..space import Space
 
 
 @functools.cache
-def moved_surface(space: Space) -> Any:
+def moved_surface(space: Space) -> wp.Function:
     """``wp.func`` Nanson's rule: the area vector s moved from F to F_new, cof(F_new F⁻¹) s, without the inverse."""
     vec, mat, determinant, cof = space.vec, space.mat, det(space), cofactor(space)
 
@@ -23,7 +22,7 @@ def moved_surface(space: Space) -> Any:
 
 
 @functools.cache
-def make_predict(space: Space, fixed: bool, surfaces: bool) -> Any:
+def make_predict(space: Space, fixed: bool, surfaces: bool) -> wp.Kernel:
     """Kernel: the half step, ``fraction`` = ½, from ``half`` = S(U) (M8); the one-step Lax scheme has 1."""
     real, mat = space.real, space.mat
     Particles, State, Forces = structure(space, "Particles"), structure(space, "State"), structure(space, "Forces")
@@ -57,7 +56,7 @@ def make_predict(space: Space, fixed: bool, surfaces: bool) -> Any:
 
 
 @functools.cache
-def make_add(space: Space) -> Any:
+def make_add(space: Space) -> wp.Kernel:
     """Kernel: the forces of an interaction added to those from outside."""
     vec = space.vec
 
@@ -70,7 +69,20 @@ def make_add(space: Space) -> Any:
 
 
 @functools.cache
-def make_kick(space: Space) -> Any:
+def make_mean(space: Space, kind: str) -> wp.Kernel:
+    """Kernel: f ← ½(f + f_new), elements of this kind (``fields.element``)."""
+    real, of_kind = space.real, element(space, kind)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def mean(first: int, f_new: wp.array(dtype=of_kind), f: wp.array(dtype=of_kind)):
+        a = first + wp.tid()
+        f[a] = (f[a] + f_new[a]) * real(0.5)
+
+    return mean
+
+
+@functools.cache
+def make_kick(space: Space) -> wp.Kernel:
     """Kernel: v^{n+1} (M8)."""
     real, vec = space.real, space.vec
     Particles, Forces, Clock = structure(space, "Particles"), structure(space, "Forces"), clock_structure(space)
@@ -85,7 +97,7 @@ def make_kick(space: Space) -> Any:
 
 
 @functools.cache
-def make_drift(space: Space, fixed: bool, surfaces: bool) -> Any:
+def make_drift(space: Space, fixed: bool, surfaces: bool) -> wp.Kernel:
     """Kernel: F, x and the surface vectors of ``state`` moved by ``fraction`` · Δt with velocity v (M8)."""
     real, vec, mat = space.real, space.vec, space.mat
     State, Reference, Clock = structure(space, "State"), structure(space, "Reference"), clock_structure(space)

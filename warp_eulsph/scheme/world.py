@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar, NamedTuple
 
 import warp as wp
 
@@ -13,6 +13,7 @@ from ..fields import allocate, arrays, repeated
 from ..interactions import BoundInteraction
 from ..operators.neighbours import NeighbourLists
 from ..space import Space
+from ..structs import ForceArrays, ParticleArrays, StateArrays
 from .exchanges import Exchange, Exchanges
 from .flux import Flux, Part
 from .ledger import Ledger
@@ -38,12 +39,35 @@ class Parts:
     """
 
     space: Space
-    U: Any
-    particles: Any
+    U: StateArrays
+    particles: ParticleArrays
     media: Sequence[MediumParts]
     conditions: Sequence[Bound]
     interactions: Sequence[BoundInteraction]
     clock: DeviceClock
+
+
+class _Steady(NamedTuple):
+    """Media in which imposed velocities have the mean of a step in its middle, and the conditions that impose there."""
+
+    media: Sequence[Medium]
+    conditions: Sequence[Bound]
+
+
+def _steady(media: Sequence[Medium], conditions: Sequence[Bound]) -> _Steady:
+    """What is steady: no limiter changes v, and no condition does that is not steady itself and in all of its media."""
+    imposing = [condition for condition in conditions if type(condition).impose is not Bound.impose]
+    where = {id(c): [m for m in media if _acts_on(c, m.span)] for c in imposing}
+    found = [medium for medium in media if medium.limiter is None]
+    for _ in media:  # a condition of two media may make both unsteady, which others share
+        for c in imposing:
+            if not c.steady or any(medium not in found for medium in where[id(c)]):
+                found = [medium for medium in found if medium not in where[id(c)]]
+    return _Steady(found, [c for c in imposing if all(medium in found for medium in where[id(c)])])
+
+
+def _acts_on(condition: Bound, span: range) -> bool:
+    return bool(((condition.indices >= span.start) & (condition.indices < span.stop)).any())
 
 
 class World:
@@ -56,6 +80,9 @@ class World:
         forces, grad_v: of the last step. clock: time on the device. ledger: where the energy went. steps: taken so far.
     """
 
+    #: Whether steps leave ∇_k v^{n+1} for the next one, in media where conditions are steady and nothing limits v.
+    keeps_gradient: ClassVar[bool] = False
+
     def __init__(self, parts: Parts):
         self.space, self.clock, self.conditions = parts.space, parts.clock, parts.conditions
         self.interactions = parts.interactions
@@ -67,20 +94,22 @@ class World:
         self.moves_surfaces = not all(medium.policy.fixed for medium in self.media) or any(
             condition.reads_surface for condition in self.conditions
         )
+        self._steady = _steady(self.media, self.conditions) if self.keeps_gradient else _Steady((), ())
         self.limiting = [condition for condition in self.conditions if condition.limits]
         self.exchanged = [wp.zeros(n, dtype=space.vec, device=device) for _ in self.interactions]
-        self.half = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
+        self.half: StateArrays = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
         if not self.moves_surfaces:
             self.half.surface = self.U.surface
         self.forces = self._allocate_forces()
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         for medium in self.media:
             medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
+            medium.keep_gradients(medium in self._steady.media)
         self._start([each.surface_given for each in parts.media])
         self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
 
-    def _allocate_forces(self) -> Any:
+    def _allocate_forces(self) -> ForceArrays:
         """Struct ``Forces``, where those that are always zero take the memory of one."""
         n, vec, device = self.n, self.space.vec, self.device
         self.damped = any(condition.damps for condition in self.conditions)
@@ -91,7 +120,7 @@ class World:
             "external": self.loaded,
             "damping": self.damped,
         }
-        forces = allocate(self.space, "Forces", n, device, empty=there)
+        forces: ForceArrays = allocate(self.space, "Forces", n, device, empty=there)
         self._zero = wp.zeros(1, dtype=vec, device=device)
         for name, needed in there.items():
             setattr(forces, name, wp.zeros(n, dtype=vec, device=device) if needed else repeated(self._zero, n))
@@ -109,13 +138,20 @@ class World:
             condition.start(self.U)
         for medium in self.media:
             medium.stabilise(self.U)
+        for interaction in self.interactions:
+            interaction.start(self)
+        for medium in self.media:
+            medium.keep_gradient(self.U)
 
     def _exchanges(self) -> Exchanges | None:
         """The page of the interactions, where there are any."""
         if not self.interactions:
             return None
         between = zip(self.interactions, self.exchanged, strict=True)
-        listed = [Exchange(forces, functools.partial(interaction.energy, self)) for interaction, forces in between]
+        listed = [
+            Exchange(forces, functools.partial(interaction.energy, self), interaction.supplied)
+            for interaction, forces in between
+        ]
         return Exchanges(self.space, self.particles, self.clock.fields, listed, self.device)
 
     # the references
@@ -147,8 +183,9 @@ class World:
         """Last part of a refresh, launches only, when the lists have room: neighbours, corrections, balance."""
         for k in due:
             self.media[k].renew(self.U)
+            self.media[k].keep_gradient(self.U)
 
-    def _shift(self, U: Any, due: Sequence[int] | None = None) -> None:
+    def _shift(self, U: StateArrays, due: Sequence[int] | None = None) -> None:
         shifted = [m for k, m in enumerate(self.media) if m.shifter is not None and (due is None or k in due)]
         for medium in shifted:
             medium.shift(U)
@@ -157,9 +194,12 @@ class World:
             self.ledger.book_shift(U)
 
     def rebuild(self) -> None:
-        """Derive what the evolving arrays determine, after they were overwritten."""
+        """Derive what the evolving arrays determine, ∇_k v of U too; to be called when they were overwritten."""
         for medium in self.media:
             medium.rebuild()
+            medium.keep_gradient(self.U)
+        for interaction in self.interactions:
+            interaction.rebuild(self)
 
     # what a checkpoint holds
 
@@ -217,6 +257,7 @@ class World:
 
     # lines of a step
 
-    def _impose(self, state: Any, fraction: float) -> None:
+    def _impose(self, state: StateArrays, fraction: float, steady: bool | None = None) -> None:
         for condition in self.conditions:
-            condition.impose(state, self.clock.fields, fraction)
+            if steady in (None, condition in self._steady.conditions):
+                condition.impose(state, self.clock.fields, fraction)

@@ -16,7 +16,9 @@ import warp as wp
 
 from ..fields import allocate
 from ..scheme.dissipation import UpwindForces
+from ..scheme.stabiliser import Sums
 from ..simulation import Simulation
+from ..structs import ForceArrays
 from .stability_step import Point, Step
 
 # Deviation of F in the central difference of the stress: 1e-8 from the third derivative, 1e-12 from round-off.
@@ -99,8 +101,8 @@ def _accelerate(simulation: Simulation, v: wp.array) -> np.ndarray:
 def _dissipate(simulation: Simulation, v: wp.array) -> np.ndarray:
     """Force [N] of M9 with ε = 1, (n, dim)."""
     stepper, space = simulation.stepper, simulation.space
-    forces = allocate(space, "Forces", len(v), simulation.device)
+    forces: ForceArrays = allocate(space, "Forces", len(v), simulation.device)
     upwind = UpwindForces(space, simulation.device)
     grad_v = _gradient(simulation, v)
-    upwind.compute(stepper.configuration, stepper.flux.fields, stepper.U.x, v, grad_v, 1.0, None, forces)
+    upwind.compute(Sums(stepper.configuration, stepper.flux.fields, grad_v, forces, 1.0), stepper.U.x, v)
     return forces.dissipation.numpy()

@@ -35,7 +35,7 @@ class Weight(ABC):
 
 
 @functools.cache
-def value(weight: Weight, space: Space) -> Any:
+def value(weight: Weight, space: Space) -> wp.Function:
     """``wp.func`` W(r, h) [1/m^d]."""
     real, dim = space.real, space.dim
     support, sigma = weight.support, weight.sigma[dim - 1]
@@ -55,7 +55,7 @@ def value(weight: Weight, space: Space) -> Any:
 
 
 @functools.cache
-def pair_weight(weight: Weight, space: Space) -> Any:
+def pair_weight(weight: Weight, space: Space) -> wp.Function:
     """``wp.func`` g(r, h) = −W'(r)/r [1/m^(d+2)], so that ∇W_ab = g (x_b − x_a)."""
     real, dim = space.real, space.dim
     support, sigma = weight.support, weight.sigma[dim - 1]

@@ -31,7 +31,7 @@ def build(dim: int, n: int, reference: ReferencePolicy, **options: Any) -> Simul
     velocity[:, 0] = 10.0 * x[:, 1] / HEIGHT
     material = RUBBER if dim == 3 else NeoHookean(density=RUBBER.density, young=RUBBER.young, poisson=0.3)
     body = Body(x=x, volume=volume, material=material, velocity=velocity)
-    base = Clamped(point=np.zeros(dim), normal=-np.eye(dim)[1])
+    base = Clamped(point=(0.0,) * dim, normal=(0.0, -1.0, 0.0)[:dim])
     return Simulation(body, boundaries=[base], reference=reference, **options)
 
 

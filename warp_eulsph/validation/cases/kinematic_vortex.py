@@ -16,7 +16,6 @@ Aimed at, from an independent corrected-SPH program (cubic spline, h = 1.4 spaci
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -59,7 +58,7 @@ def exact(x: np.ndarray, t: float, period: float, steps: int = 400) -> tuple[np.
 
 
 @functools.cache
-def make_flow(period: float) -> Any:
+def make_flow(period: float) -> wp.Function:
     """``wp.func`` (x [m], t [s]) -> velocity [m/s]."""
     turn, pi = math.pi / period, math.pi
 

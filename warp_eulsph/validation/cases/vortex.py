@@ -56,7 +56,7 @@ def exact(X: np.ndarray, t: float, amplitude: float = 1.0) -> tuple[np.ndarray, 
 
 
 @functools.cache
-def make_force(amplitude: float, rings: int) -> Any:
+def make_force(amplitude: float, rings: int) -> wp.Function:
     """``wp.func`` (X [m], t [s]) -> body force per mass [m/s²] of particles on ``rings`` rings."""
     A, pi, diffusivity = amplitude * math.pi, math.pi, MU / RING.density
     half_cell = (OUTER / INNER) ** (0.5 / rings)
