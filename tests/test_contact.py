@@ -195,7 +195,7 @@ def test_rings_give_their_energy_back(speed):
     for _ in simulation.frames(np.linspace(0.4, 3.0, 6) / (speed * C_P)):
         held = max(held, simulation.energy()["held"])
     energy = simulation.energy()
-    assert held > 5e-4 * start and energy["held"] == 0.0
+    assert held > 5e-4 * start and energy["held"] < 0.1 * held
     assert mean_velocity(simulation, "left")[0] < 0.0 < mean_velocity(simulation, "right")[0]
     assert abs(energy["interaction"]) < 0.03 * start
     assert abs(energy["residual"]) < 1e-11 * start

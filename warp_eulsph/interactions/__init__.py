@@ -2,6 +2,27 @@
 
 from .base import BoundInteraction, Interaction
 from .contact import Contact
+from .free import Free
+from .rigid import BoundRigidBody, RigidBody
+from .rigid_motion import Driven, Held, Moving, RigidMotion
+from .shapes import Box, Cylinder, Plane, Shape, Sphere
 from .skin import Skin
 
-__all__ = ["BoundInteraction", "Contact", "Interaction", "Skin"]
+__all__ = [
+    "BoundInteraction",
+    "BoundRigidBody",
+    "Box",
+    "Contact",
+    "Cylinder",
+    "Driven",
+    "Free",
+    "Held",
+    "Interaction",
+    "Moving",
+    "Plane",
+    "RigidBody",
+    "RigidMotion",
+    "Shape",
+    "Skin",
+    "Sphere",
+]

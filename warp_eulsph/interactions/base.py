@@ -76,6 +76,13 @@ class BoundInteraction(ABC):
         """Energy [J] that it holds at ``world.U``, kinetic energy of its own included; reads the device."""
         return 0.0
 
+    def supplied(self) -> float:
+        """Energy [J] put in from outside since the start, by a drive or weight of its own; reads the device.
+
+        It is in the account ``external`` of the ledger.
+        """
+        return 0.0
+
     def evolving(self) -> dict[str, wp.array]:
         """Arrays by name that a step reads before it writes them: what a checkpoint must hold of it."""
         return {}

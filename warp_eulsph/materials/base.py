@@ -52,6 +52,8 @@ class Law(NamedTuple):
             because its F would grow without bound in shear. Twice must equal once, because a step of length zero
             updates too.
         rebase: see below.
+        secant: (h, constants) -> share in [0, 1] of the elastic stiffness in shear that stress over total strain still
+            is, by which positions are tied to F (M16): all of it where it is None, with h of the start too.
         history: the variables that the law remembers, in this order one row of reals per particle; the same in every
             dimension.
 
@@ -76,6 +78,7 @@ class Law(NamedTuple):
     wave_moduli: Any
     update: Any = None
     rebase: Any = None
+    secant: Any = None
     history: tuple[Variable, ...] = ()
 
     @property
