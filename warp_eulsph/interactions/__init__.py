@@ -7,6 +7,7 @@ from .rigid import BoundRigidBody, RigidBody
 from .rigid_motion import Driven, Held, Moving, RigidMotion
 from .shapes import Box, Cylinder, Plane, Shape, Sphere
 from .skin import Skin
+from .triangle_mesh import TriangleMesh
 
 __all__ = [
     "BoundInteraction",
@@ -25,4 +26,5 @@ __all__ = [
     "Shape",
     "Skin",
     "Sphere",
+    "TriangleMesh",
 ]

@@ -23,7 +23,6 @@ class Triangles:
     mesh: wp.uint64
     points: wp.array(dtype=wp.vec3d)
     corners: wp.array(dtype=wp.int32)
-    reach: wp.float64
 
 
 class Solid(NamedTuple):
@@ -36,6 +35,7 @@ class Solid(NamedTuple):
         inertia: principal moments of inertia over mass [m²], (3,).
         numbers: for its function of distance, at most 6.
         triangles: struct ``Triangles``.
+        mesh: Warp's, which lives as long as this.
     """
 
     home: np.ndarray
@@ -44,6 +44,7 @@ class Solid(NamedTuple):
     inertia: np.ndarray
     numbers: Sequence[float]
     triangles: Any
+    mesh: Any = None
 
 
 class Shape(ABC):
