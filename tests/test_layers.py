@@ -142,6 +142,12 @@ class TestFile:
         assert not [word for word in ("TO" + "DO", "FIX" + "ME", "X" * 3) if word in text]
 
 
+def test_tests_and_examples_are_short():
+    files = [path for folder in ("tests", "examples") for path in (PACKAGE.parent / folder).rglob("*.py")]
+    long = [path.name for path in files if len(path.read_text(encoding="utf-8").splitlines()) > MAX_LINES]
+    assert len(files) > 90 and not long
+
+
 HEAVY = ("h5py", "matplotlib", "vtkmodules", "pyvista", "meshio", "PIL", "pydantic", "xarray", "pandas")
 
 
