@@ -1,6 +1,7 @@
 """The first attacks of each class of ``attacks.py``, which has the long campaign."""
 
 import attacks
+import faults
 import pytest
 
 
@@ -8,15 +9,15 @@ import pytest
 def test_first_attacks_are_held_or_refused(name, tmp_path):
     for seed in range(6 * attacks.ATTACKS[name][1]):
         outcome, said = attacks.attacked(name, seed, tmp_path)
-        assert outcome in (attacks.HELD, attacks.REFUSED), (seed, said)
+        assert outcome in (faults.HELD, faults.REFUSED), (seed, said)
 
 
 def test_faults_are_found_and_counted(monkeypatch, tmp_path, capsys):
     def wrong(rng, folder):
-        attacks.right(False, "a wrong value")
+        faults.right(False, "a wrong value")
 
     def gone(rng, folder):
-        raise attacks.LostError("a snapshot")
+        raise faults.LostError("a snapshot")
 
     def broken(rng, folder):
         return {}["not there"]

@@ -95,7 +95,7 @@ def test_particles_are_sorted_in_memory_unless_the_case_says_no():
 
 
 def test_meshes_are_found_beside_the_case_file(tmp_path):
-    from test_meshes import angle_profile, write
+    from surfaces import angle_profile, write
 
     write(tmp_path / "angle.vtk", *angle_profile())
     (tmp_path / "case.toml").write_text(

@@ -269,7 +269,9 @@ def test_energy_that_a_gas_does_not_have_stops_the_run():
     simulation = shock_tube.build(40, shock_tube.TUBES["sod"])
     simulation.step(3)
     simulation.stepper.flux.parts[0].history.fill_(-0.1)
-    with pytest.raises(es.UnstableError, match=r"of body 'left' at x = .*no state.*adiabat = -0\.[01].*try a smaller cfl"):
+    with pytest.raises(
+        es.UnstableError, match=r"of body 'left' at x = .*no state.*adiabat = -0\.[01].*try a smaller cfl"
+    ):
         simulation.step(3)
 
 

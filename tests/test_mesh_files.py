@@ -1,18 +1,16 @@
 """Meshes as other programs write them: repeated, split, jittered, merged, of second order; against known volumes."""
 
 import itertools
-import sys
 
 import meshio
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_meshes import brick, write
+from surfaces import brick, write
 
-from warp_eulsph.geometry import Patch, Repair, mesh, outline
-from warp_eulsph.geometry.faces import SOLIDS, outer_triangles, weld
-from warp_eulsph.geometry.repair import turned_alike
+from warp_eulsph.geometry import Patch, mesh, outline
+from warp_eulsph.geometry.faces import SOLIDS, outer_triangles
 from warp_eulsph.geometry.surface import Surface, read_surface
 from warp_eulsph.geometry.union import united
 
@@ -146,168 +144,6 @@ def test_surfaces_of_second_order_follow_their_midside_nodes(kind, corners, tmp_
     assert surface.volume == pytest.approx(1.0, rel=1e-12)
 
 
-def written(tmp_path, *boxes, inwards=()):
-    """Bricks (lower, upper) in one file; those numbered in ``inwards`` face inwards."""
-    pieces = [brick(*box) for box in boxes]
-    turned = [triangles[:, ::-1] if k in inwards else triangles for k, (_, triangles) in enumerate(pieces)]
-    points = np.concatenate([points for points, _ in pieces])
-    return write(tmp_path / "pieces.vtk", points, np.concatenate([t + 8 * k for k, t in enumerate(turned)]))
-
-
-def bricks_contain(x, boxes):
-    """How many of the boxes each point lies in, (n,)."""
-    return sum((((x > lower) & (x < upper)).all(axis=1)).astype(int) for lower, upper in boxes)
-
-
-CUBE = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-
-
-@pytest.mark.parametrize("offset", [(0.5, 0.0, 0.0), (0.5, 0.5, 0.5), (0.75, 0.25, 0.0), (0.0, 0.0, 0.0)])
-def test_matter_that_two_closed_surfaces_enclose_counts_once(tmp_path, offset, caplog):
-    """Two unit cubes: 2 less what they share; half apart along x it is 1.5."""
-    other = (np.array(offset), np.array(offset) + 1.0)
-    x, volume = mesh(written(tmp_path, CUBE, other), 1.0 / 16)
-    shared = np.prod(1.0 - np.abs(offset))
-    assert volume.sum() == pytest.approx(2.0 - shared, rel=1e-12)
-    assert len(x) == round((2.0 - shared) * 16**3) and (bricks_contain(x, [CUBE, other]) > 0).all()
-    assert ("closed surfaces lie in each other" in caplog.text) == any(offset)
-
-
-@settings(max_examples=25, deadline=None)
-@given(st.lists(st.tuples(*[st.integers(0, 7)] * 3, *[st.integers(1, 6)] * 3), min_size=2, max_size=4), st.booleans())
-def test_unions_have_the_volume_of_the_cells_that_any_brick_holds(tmp_path_factory, boxes, shifted):
-    """Bricks on a lattice of integers, so that cells counted one by one are an independent volume."""
-    corners = [(np.array(b[:3], dtype=float), np.array(b[:3], dtype=float) + b[3:]) for b in boxes]
-    cells = np.stack(np.meshgrid(*[np.arange(14) + 0.5] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    right = (bricks_contain(cells, corners) > 0).sum()
-    moved = [(lower + 100.3 * shifted, upper + 100.3 * shifted) for lower, upper in corners]
-    surface = read_surface(written(tmp_path_factory.mktemp("union"), *moved))
-    try:
-        made = united(surface, "bricks")
-    except ValueError as error:  # bricks that share an edge or corners hang together: said, never wrong
-        assert "must not pass through itself" in str(error) or "border one other along each edge" in str(error)
-        assert "repair=Repair(take=True)" in str(error)
-        return
-    assert made.volume == pytest.approx(right, rel=1e-9)
-    inside = made.query(winding=0.5)(cells + 100.3 * shifted)[0] > 0.0
-    assert inside.sum() == right
-
-
-def test_one_inside_another_is_a_hollow_if_it_faces_inwards(tmp_path):
-    inner, core = ((0.25,) * 3, (0.75,) * 3), ((0.375,) * 3, (0.625,) * 3)
-    for boxes, inwards, right in (
-        ((CUBE, inner), (), 1.0),  # the same sense: matter that is there twice is there once
-        ((CUBE, inner), (1,), 1.0 - 0.125),
-        ((CUBE, inner), (0,), 1.0 - 0.125),  # all of it inside out
-        ((CUBE, inner, core), (1,), 1.0 - 0.125 + 0.25**3),  # a core in the hollow
-        ((CUBE, inner, core), (1, 2), 1.0 - 0.125),
-        ((CUBE, inner, ((0.5, 0.25, 0.25), (2.0, 0.75, 0.75))), (1,), 1.0 + 0.25 - 0.125 / 2),  # half filled by a third
-        ((CUBE, ((2, 0, 0), (3, 1, 1))), (), 2.0),
-        ((CUBE, ((1, 0, 0), (2, 0.5, 0.5))), (), 1.25),  # touching, cut otherwise
-    ):
-        x, volume = mesh(written(tmp_path, *boxes, inwards=inwards), 1.0 / 16)
-        assert volume.sum() == pytest.approx(right, rel=1e-12), (boxes, inwards)
-        assert len(x) == round(right * 16**3)
-    with pytest.raises(ValueError, match="nor face inwards where there is no matter"):
-        mesh(written(tmp_path, CUBE, ((2, 0, 0), (3, 0.5, 1)), inwards=(1,)), 0.125)
-    with pytest.raises(ValueError, match="must be a hollow within one that faces outwards"):
-        mesh(written(tmp_path, CUBE, ((0.5, 0.25, 0.25), (1.5, 0.5, 0.5)), inwards=(1,)), 0.125)
-
-
-def test_regions_on_a_union_know_no_surface_within_it(tmp_path):
-    file = written(tmp_path, CUBE, ((0.5, 0.0, 0.0), (1.5, 1.0, 1.0)))
-    x, _ = mesh(file, 0.125)
-    outside = np.minimum(x, [1.5, 1.0, 1.0] - x).min(axis=1) < 0.125
-    np.testing.assert_array_equal(Patch(file, 0.124)(x), outside)
-
-
-def test_a_surface_that_passes_through_itself_is_refused(tmp_path):
-    points, triangles = brick(*CUBE)
-    points[points[:, 2] == 1.0, 0] = 0.75 - 0.5 * points[points[:, 2] == 1.0, 0]  # the top turned inside out
-    with pytest.raises(ValueError, match="must not pass through itself"):
-        mesh(write(tmp_path / "pulled.vtk", points, triangles), 0.1)
-
-
-def test_pieces_that_meet_need_manifold3d(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "manifold3d", None)
-    assert len(mesh(written(tmp_path, CUBE, ((2, 0, 0), (3, 1, 1))), 0.25)[0]) == 128
-    with pytest.raises(ModuleNotFoundError, match=r"pip install 'warp_eulsph\[mesh\]'"):
-        mesh(written(tmp_path, CUBE, ((0.5, 0, 0), (1.5, 1, 1))), 0.25)
-
-
-def test_openings_are_closed_on_demand(tmp_path, caplog):
-    points, triangles = brick(*CUBE)
-    for gone in ([0], [0, 1], [0, 5], [3, 4, 7], [0, 1, 2, 3]):
-        file = write(tmp_path / "open.vtk", points, np.delete(triangles, gone, axis=0))
-        with pytest.raises(ValueError, match=r"at an opening.*mend it by repair=Repair\(close=True\)"):
-            mesh(file, 0.125)
-        caplog.clear()
-        x, volume = mesh(file, 0.125, repair=Repair(close=True))
-        whole = gone != [0, 1, 2, 3] and gone != [3, 4, 7]  # rims in a plane give back what was there
-        assert "closed, the widest of" in caplog.text and len(x)
-        if whole:
-            assert volume.sum() == pytest.approx(1.0, rel=1e-12) and len(x) == 512
-        assert 0.5 < volume.sum() <= 1.0 + 1e-12
-    pipe = np.array([[np.cos(a), np.sin(a), z] for z in (0, 2) for a in 2 * np.pi * np.arange(40) / 40])
-    sides = [t for k in range(40) for t in ([k, (k + 1) % 40, k + 40], [(k + 1) % 40, (k + 1) % 40 + 40, k + 40])]
-    both = np.concatenate([pipe, pipe * [0.5, 0.5, 1.0]]), np.concatenate([sides, np.array(sides)[:, ::-1] + 80])
-    _, volume = mesh(write(tmp_path / "pipe.vtk", *both), 0.1, repair=Repair(close=True))
-    area = 0.5 * 40 * np.sin(2 * np.pi / 40)
-    assert volume.sum() == pytest.approx(2.0 * area * (1.0 - 0.25), rel=1e-9)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.integers(0, 11), min_size=1, max_size=12, unique=True), st.booleans())
-def test_facets_that_face_the_wrong_way_are_turned_on_demand(tmp_path_factory, flipped, split):
-    points, triangles = brick(*CUBE)
-    triangles[flipped] = triangles[flipped][:, ::-1]
-    if split:
-        points, triangles = points[triangles].reshape(-1, 3), np.arange(36).reshape(-1, 3)
-    file = write(tmp_path_factory.mktemp("flip") / "flip.vtk", points, triangles)
-    if len(flipped) < 12:
-        with pytest.raises(ValueError, match=r"mend it by repair=Repair\(turn=True\)"):
-            mesh(file, 0.25)
-    x, volume = mesh(file, 0.25, repair=Repair(turn=True))
-    assert volume.sum() == pytest.approx(1.0, rel=1e-12) and len(x) == 64
-
-
-def test_a_surface_can_be_taken_as_it_is(tmp_path):
-    points, triangles = brick(*CUBE)
-    for surface in ((points, np.delete(triangles, 3, axis=0)), (points, np.delete(triangles, 3, axis=0)[:, ::-1])):
-        x, volume = mesh(write(tmp_path / "open.vtk", *surface), 0.0625, repair=Repair(take=True))
-        assert volume.sum() == pytest.approx(1.0, rel=0.15) and ((x > 0) & (x < 1)).all()
-    for second, right in (((0.5, 0, 0), (1.5, 1, 1)), 1.5), (((0.25,) * 3, (0.75,) * 3), 1.0):
-        file = written(tmp_path, CUBE, second)
-        assert mesh(file, 0.0625, repair=Repair(take=True))[1].sum() == pytest.approx(right, rel=1e-12)
-    with pytest.raises(ValueError, match="0 particles would have to hold what is inside"):
-        mesh(write(tmp_path / "sheet.vtk", points, triangles[[0, 2]]), 0.25, repair=Repair(take=True))
-
-
-def test_a_band_of_one_side_is_refused():
-    band = np.array([[k, k + 1, k + 2] for k in range(8)] + [[8, 9, 1], [9, 1, 0]])
-    with pytest.raises(ValueError, match="one side only"):
-        turned_alike(np.random.default_rng(0).random((10, 3)), band, "band")
-
-
-def test_the_tolerance_of_welding_can_be_said(tmp_path):
-    points, triangles = brick(*CUBE)
-    split = points[triangles].reshape(-1, 3), np.arange(36).reshape(-1, 3)
-    file = write(tmp_path / "split.vtk", split[0] + 1e-4 * np.random.default_rng(0).uniform(-1, 1, (36, 3)), split[1])
-    with pytest.raises(ValueError, match=r"where corners miss each other by repair=Repair\(weld=\.\.\.\)"):
-        mesh(file, 0.125)
-    x, volume = mesh(file, 0.125, repair=Repair(weld=1e-3))
-    assert volume.sum() == pytest.approx(1.0, rel=1e-3) and len(x) == 512
-    near = split[0] + 1e-8 * np.random.default_rng(0).uniform(-1, 1, (36, 3))
-    file = write(tmp_path / "near.vtk", near, split[1])
-    assert len(mesh(file, 0.125)[0]) == 512
-    with pytest.raises(ValueError, match="must be closed"):
-        mesh(file, 0.125, repair=Repair(weld=0.0))
-    with pytest.raises(ValueError, match=r"weld must be a length \[m\], at least 0, got -1"):
-        Repair(weld=-1.0)
-    with pytest.raises(ValueError, match="without"):
-        mesh(file, 0.125, repair=Repair(weld=5.0))
-
-
 def test_a_tetrahedral_mesh_with_one_surface_group_is_closed_and_groups_go_by_dimension(tmp_path):
     points, cells = solid("tetra")
     clamp = np.array([[0, 4, 7], [0, 7, 3]])  # of x = 0
@@ -388,17 +224,6 @@ def test_files_without_a_mesh_are_refused(tmp_path, name, content, capfd):
         mesh(tmp_path / name, 0.1)
     said = capfd.readouterr()
     assert not said.out and "Error" not in said.err
-
-
-def test_welding_joins_what_is_near_and_nothing_else():
-    rng = np.random.default_rng(0)
-    apart = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1).reshape(-1, 3)
-    points = np.concatenate([apart, apart + 1e-3 * rng.uniform(-0.5, 0.5, apart.shape)])
-    assert np.array_equal(weld(points, 1e-3)[:216], weld(points, 1e-3)[216:])
-    assert len(np.unique(weld(points, 1e-3))) == 216 and len(np.unique(weld(points, 0.0))) == 432
-    line = np.zeros((5000, 3))
-    line[:, 0] = np.linspace(0.0, 1.0, 5000)  # spaced by 200 times the tolerance: a chain of none
-    assert len(np.unique(weld(line, 1e-6))) == 5000
 
 
 def test_outlines_of_second_order_and_with_corners_that_miss_each_other(tmp_path):

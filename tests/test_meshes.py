@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from surfaces import angle_profile, brick, write
 
 from warp_eulsph.geometry import (
     BodyCentred,
@@ -21,30 +22,6 @@ def nearest(x):
     from scipy.spatial import cKDTree
 
     return cKDTree(x).query(x, 2)[0][:, 1]
-
-
-def brick(lower, upper):
-    """Corners and outward triangles of a box."""
-    corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    triangles = np.array([[q[0], q[a], q[a + 1]] for q in quads for a in (1, 2)])
-    return np.array(lower) + corners * (np.array(upper) - lower), triangles
-
-
-def angle_profile():
-    """Corners and triangles of an L: a unit square 1 m deep less its upper right quarter; concave."""
-    outline = np.array([[0, 0], [1, 0], [1, 0.5], [0.5, 0.5], [0.5, 1], [0, 1]], dtype=float)
-    points = np.concatenate([np.pad(outline, ((0, 0), (0, 1))), np.pad(outline, ((0, 0), (0, 1)), constant_values=1.0)])
-    flat = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [3, 4, 5]])
-    sides = [t for k in range(6) for t in ([k, (k + 1) % 6, (k + 1) % 6 + 6], [k, (k + 1) % 6 + 6, k + 6])]
-    return points, np.concatenate([flat[:, ::-1], flat + 6, sides])
-
-
-def write(path, points, triangles, **options):
-    import meshio
-
-    meshio.Mesh(points, [("triangle", np.asarray(triangles))]).write(path, **options)
-    return path
 
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "vtk", "vtu", "msh"])

@@ -28,7 +28,7 @@ def test_the_law_of_the_page_keeps_its_books(page):
     assert 0.5 < page["crushed"].min() < 0.8
     assert energy["material"] == pytest.approx(-page["exact"], rel=1e-9) and -energy["material"] > 0.3 * start
     assert abs(energy["residual"]) < 1e-12 * start and abs(energy["stepping"]) < 0.01 * start
-    held = {name: array.numpy() for name, array in simulation.evolving().items()}
+    held = {name: np.array(array.numpy()) for name, array in simulation.evolving().items()}
     counters = simulation.counters
     simulation.step(5)
     ahead = simulation.history("plastic_volume")

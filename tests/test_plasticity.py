@@ -1,108 +1,17 @@
-"""J2 plasticity: paths with exact or fine-step solutions, invariances, every dimension and reference, the books."""
+"""J2 plasticity of one particle: paths with exact or fine-step solutions, invariances, every dimension."""
 
-import dataclasses
-import functools
 import math
 
 import numpy as np
 import pytest
 import warp as wp
+from points import HARDENINGS, KAPPA, MU, Point, mises, sheared, stretched
 from scipy.linalg import expm, logm
 from scipy.optimize import brentq
 
-import warp_eulsph as es
-from warp_eulsph.geometry import box
-from warp_eulsph.materials import J2, Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
-from warp_eulsph.materials.base import history_row
+from warp_eulsph.materials import JohnsonCook, LinearHardening, Tabulated, Voce
 from warp_eulsph.materials.log_strain import deviatoric_logarithm, exponential
 from warp_eulsph.space import Space, matrix_type
-
-COPPER = {"density": 8930.0, "young": 117e9, "poisson": 0.35}
-MU, KAPPA = COPPER["young"] / 2.7, COPPER["young"] / 0.9
-HARDENINGS = {
-    "perfect": LinearHardening(yield_stress=0.4e9),
-    "linear": LinearHardening(yield_stress=0.4e9, modulus=0.1e9),
-    "voce": Voce(yield_stress=0.1e9, saturation=0.3e9, rate=8.0),
-    "table": Tabulated(strains=(0.0, 0.05, 0.2, 1.0), stresses=(0.1e9, 0.25e9, 0.35e9, 0.4e9)),
-    "johnson_cook": JohnsonCook(A=90e6, B=292e6, n=0.31, C=0.025, m=1.09),
-}
-DOUBLE = Space(3)
-
-
-@functools.cache
-def make_point(space, law):
-    """Kernel: one step of one particle: update, then stress, energy, and the half step's stress before it."""
-    real, mat, row, Constants = space.real, space.mat, history_row(space, law), law.Constants
-    stress, energy, update, rebase = law.stress, law.energy, law.update, law.rebase
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def point(
-        F: wp.array(dtype=mat),
-        dt: real,
-        anew: int,
-        c: Constants,
-        h: wp.array(dtype=row),
-        ahead: wp.array(dtype=mat),
-        P: wp.array(dtype=mat),
-        out: wp.array(dtype=real),
-    ):
-        ahead[0] = stress(F[0], mat(), h[0], dt, c)
-        F_new, h_new, lost = update(F[0], mat(), h[0], dt, c)
-        if anew == 1:
-            F_new, h_new = rebase(F_new, h_new, c)
-        F[0] = F_new
-        h[0] = h_new
-        P[0] = stress(F_new, mat(), h_new, real(0.0), c)
-        out[0] = energy(F_new, h_new, c)
-        out[1] = lost
-
-    return point
-
-
-class Point:
-    """One particle of a material on a path; ``sigma`` (3, 3) or (dim, dim), ``ahead`` that of the half-step form."""
-
-    def __init__(self, hardening, space=DOUBLE):
-        self.space, self.material = space, J2(**COPPER, hardening=hardening)
-        self.law = self.material.law(space)
-        row = history_row(space, self.law)
-        self.h = wp.array([row(*self.law.start)], dtype=row)
-        self.constants, self.lost, self.energy = self.material.filled_constants(self.law), [], [0.0]
-        self.total, self.F = np.eye(space.dim), np.eye(space.dim)
-
-    def step(self, F, dt=1.0, anew=False):
-        """To the total F; from a rebased one by the motion since."""
-        dim, mat = self.space.dim, self.space.mat
-        start = F @ np.linalg.inv(self.total) @ self.F if anew else F
-        new = wp.array(start[None].astype(self.space.numpy), dtype=mat)
-        ahead, P = (wp.zeros(1, dtype=mat) for _ in range(2))
-        out = wp.zeros(2, dtype=self.space.real)
-        arguments = [new, dt, int(anew), self.constants, self.h, ahead, P, out]
-        wp.launch(make_point(self.space, self.law), 1, arguments)
-        self.total, self.F = F, new.numpy()[0].astype(float).reshape(dim, dim)
-        J = np.linalg.det(self.F)
-        self.sigma = P.numpy()[0].reshape(dim, dim) @ self.F.T / J
-        self.ahead = ahead.numpy()[0].reshape(dim, dim) @ start.T / np.linalg.det(start)
-        self.lost.append(float(out.numpy()[1]))
-        self.energy.append(float(out.numpy()[0]))
-        return self
-
-    def __getattr__(self, name):
-        return self.law.by_name(self.h.numpy())[name][0]
-
-
-def mises(tau):
-    deviator = tau - np.trace(tau) / 3.0 * np.eye(3)
-    return math.sqrt(1.5 * float(np.sum(deviator**2)))
-
-
-def stretched(strain):
-    """F of an isochoric uniaxial stretch with this logarithmic strain."""
-    return np.diag(np.exp([strain, -0.5 * strain, -0.5 * strain]))
-
-
-def sheared(angle):
-    return np.eye(3) + angle * np.outer([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
 
 
 def simple(hardening, alpha):
@@ -294,130 +203,6 @@ def test_logarithm_and_exponential(real):
     deviator = S - np.trace(S, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
     np.testing.assert_allclose(e.numpy(), deviator, atol=40 * eps)
     np.testing.assert_allclose(back.numpy(), [expm(d) for d in deviator], atol=80 * eps)
-
-
-def block(dim, reference, dtype=wp.float64, hardening=HARDENINGS["linear"], **options):
-    """A block of copper, 1 cm, squeezed one way and pulled the other by its own motion."""
-    n = {1: 20, 2: 8, 3: 5}[dim]
-    x, volume = box((0.0,) * dim, (0.01,) * dim, 0.01 / n)
-    velocity = -2e4 * (x - 0.005) * np.array([1.0, -0.5, 0.3])[:dim]
-    body = es.Body(x=x, volume=volume, material=J2(**COPPER, hardening=hardening), velocity=velocity)
-    return es.Simulation(body, reference=reference, arrangement=es.Current(), dtype=dtype, **options)
-
-
-@pytest.mark.parametrize(
-    ("reference", "dim", "dtype"),
-    [
-        (es.Never(), 3, wp.float64),
-        (es.Always(), 3, wp.float32),
-        (es.Every(4), 2, wp.float64),
-        (es.Always(), 2, wp.float32),
-        (es.Always(), 1, wp.float64),
-    ],
-)
-def test_the_books_close(reference, dim, dtype):
-    """Every joule is kinetic, stored, plastic or M9's; plastic work is the material's account, stepping stays small."""
-    simulation = block(dim, reference, dtype, HARDENINGS["johnson_cook"])
-    simulation.run(8e-6)
-    energy, start = simulation.energy(), simulation.stepper.ledger.start
-    work = float((simulation.history("plastic_work") * simulation.particles.V0.numpy()).sum())
-    eps = float(np.finfo(simulation.space.numpy).eps)
-    assert energy["material"] == pytest.approx(-work, rel=1e3 * eps)
-    assert work > 0.3 * start and abs(energy["residual"]) < 100 * eps * start
-    assert abs(energy["stepping"]) < 0.03 * start
-    assert simulation.history("temperature").min() > 293.0
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_every_reference_gives_the_same_answer(dim):
-    """The arrangement read anew each step, each tenth, and never, without tie and tilt."""
-    scheme = es.Verlet(tie=None, tilt=None)
-    found = [block(dim, policy, scheme=scheme) for policy in (es.Never(), es.Always(), es.Every(10))]
-    for simulation in found:
-        simulation.run(4e-6)
-    strains = [simulation.history("plastic_strain") for simulation in found]
-    np.testing.assert_allclose(strains[2], strains[1], atol=1e-3)
-    np.testing.assert_allclose(strains[0].mean(), strains[1].mean(), rtol=0.02)
-    assert strains[0].mean() > 0.01
-
-
-def test_a_field_of_snapshots_and_probes(tmp_path):
-    from warp_eulsph.output import PointProbe, Recording, Run, record
-
-    simulation = block(2, es.Always())
-    probe = PointProbe(name="middle", X=(0.005, 0.005))
-    record(simulation, tmp_path, 2e-6, Recording(probes=[probe]))
-    run = Run(tmp_path)
-    assert np.allclose(run[-1]["plastic_strain"], simulation.history("plastic_strain"), rtol=1e-6)
-    assert run[-1]["plastic_metric"].shape == (64, 3, 3) and run[-1].units["plastic_work"] == "J/m^3"
-    table = run.probes["middle"]
-    assert table.units["plastic_strain"] == "-" and table["plastic_strain"][-1] > 0.01
-
-
-def test_sigma_33_of_plane_strain_knows_the_history():
-    simulation = block(2, es.Always())
-    simulation.run(6e-6)
-    sigma, J = simulation.cauchy_stress, simulation.J
-    deviator = sigma - np.trace(sigma.T)[:, None, None] / 3.0 * np.eye(3)
-    q = J * np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2)))
-    y = 0.4e9 + 0.1e9 * simulation.history("plastic_strain")
-    assert (q <= y * (1.0 + 1e-9)).all() and (q > 0.99 * y).any()
-    np.testing.assert_allclose(np.trace(sigma.T) / 3.0, KAPPA * np.log(J) / J, atol=1e-9 * KAPPA)
-
-
-@wp.func
-def slide(X: wp.vec2d, t: wp.float64) -> wp.vec2d:
-    return wp.vec2d(wp.float64(10.0) * t * X[1], wp.float64(0.0))
-
-
-def plates(n, surface=None, **options):
-    """A jittered block, n across, that yields at 1 % of its modulus, sheared by 10 per second; the free particles."""
-    x, volume = box((0.0, 0.0), (1.0, 1.0), 1.0 / n, jitter=0.1)
-    layers = np.arange(len(x)) % n  # the last axis of a lattice runs fastest
-    law = J2(density=1e3, young=1e6, poisson=0.3, hardening=LinearHardening(yield_stress=1e4))
-    velocity = 10.0 * x[:, 1:] * np.array([1.0, 0.0])
-    body = es.Body(x=x, volume=volume, material=law, velocity=velocity, surface=surface)
-    held = [es.Motion(slide, layers >= n - 3), es.Motion(slide, layers < 3)]
-    free = (layers >= 3) & (layers < n - 3)
-    return es.Simulation(body, boundaries=held, periodic=(1.0, 0.0), **options), free
-
-
-def test_shear_without_end_keeps_the_yield_stress():
-    """To a shear of 20 Eulerian, kept even and with true surface vectors; the fixed reference to 3, by short steps."""
-    layers = np.arange(144) % 12
-    surface = ((1.0 * (layers == 11) - 1.0 * (layers == 0)) / 12)[:, None] * np.array([0.0, 1.0])
-    even = {"arrangement": es.Current(), "scheme": es.Verlet(shifting=es.Shifting()), "surface": surface}
-    for shear, options in ((20.0, even), (3.0, {})):
-        simulation, free = plates(12, **options)
-        simulation.run(shear / 10.0)
-        tau = simulation.cauchy_stress[free, 0, 1] / (1e4 / math.sqrt(3.0))
-        assert np.abs(tau - 1.0).max() < 0.03
-        assert float(simulation.history("plastic_strain")[free].mean()) > 0.95 * shear / math.sqrt(3.0)
-        energy = simulation.energy()
-        assert abs(energy["residual"]) < 1e-12 * energy["total"]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Falling(Hardening):
-    """Yield stress that nobody can follow: none beyond a plastic strain of 1 %."""
-
-    def constants(self):
-        return {"y0": 0.1e9}
-
-    @staticmethod
-    @functools.cache
-    def make_yield_stress(real, Constants):
-        @wp.func
-        def falling(alpha: real, rate: real, T: real, c: Constants) -> real:
-            return c.y0 / wp.sqrt(real(0.01) - alpha)
-
-        return falling
-
-
-def test_a_mapping_that_does_not_converge_is_named():
-    simulation = block(2, es.Always(), hardening=Falling())
-    with pytest.raises(es.UnstableError, match=r"particle \d+ of body 'body' at x = .*no state that its material"):
-        simulation.run(1e-5)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
 """The table of array fields, and the ``wp.struct`` types made from it.
 
 Every array that kernels share stands in one table below with its kind, unit and meaning; ``structure`` makes the Warp
-struct of a group and ``allocate`` its arrays, so that the table cannot drift from the code; ``structs.py`` has their names
-for host code. Shapes: ``real`` (n,), ``vec`` (n,) of (dim,), ``mat`` (n,) of (dim, dim); ``int`` (n,).
+struct of a group and ``allocate`` its arrays, so that the table cannot drift from the code; ``structs.py`` has the
+names for host code. Shapes: ``real`` (n,), ``vec`` (n,) of (dim,), ``mat`` (n,) of (dim, dim); ``int`` (n,).
 """
 
 import functools
@@ -58,6 +58,9 @@ FLUX = {
     "Q": Field("mat", "Pa", "stress in the reference, P F_k^T / J_k (M1)"),
     "Pi": Field("mat", "Pa", "stress times correction, Q L^T (M5); empty where the forces make it themselves"),
     "tie": Field("mat", "Pa", "share of Q that ties F to the positions (M16); empty where nothing is tied"),
+    "secant": Field("real", "-", "root of the secant stiffness in shear over the elastic one, of what is tied (M16)"),
+    "tied": Field("real", "J", "what the tie would hold more per root of the secant; empty where nothing tied yields"),
+    "slipped": Field("real", "J", "what the tie lost by yielding in the last step; empty where nothing tied yields"),
     "dissipated": Field("real", "J", "energy that the law dissipated in the last step; empty where none does"),
     "drag": Field(
         "mat", "Pa", "share of Q that is the dissipation's (M9); empty where its forces are all there is of it"

@@ -15,6 +15,9 @@ from .space import Space
 
 log = logging.getLogger(__name__)
 
+# What only laws with a history have
+_OF_YIELDING = ("Flux.dissipated", "Flux.secant", "Flux.tied", "Flux.slipped")
+
 
 def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.DeviceLike, n: float = math.inf) -> float:
     """About what the default scheme allocates per particle, inside a body.
@@ -29,7 +32,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.Devi
     """
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
-    absent = {"Forces.correction", "Forces.external", "Flux.drag"} | ({"Flux.Pi"} if vectors else set())
+    absent = {"Forces.correction", "Forces.external", "Flux.drag", *_OF_YIELDING} | ({"Flux.Pi"} if vectors else set())
     moved = {"Reference.resolution", "Reference.moment", "Flux.tie", "Forces.tie"}
     absent |= moved if moving else {"Reference.F", "Reference.balanced"}
     present = [

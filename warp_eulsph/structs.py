@@ -51,6 +51,9 @@ class FluxArrays(Protocol):
     Q: wp.array
     Pi: wp.array
     tie: wp.array
+    secant: wp.array
+    tied: wp.array
+    slipped: wp.array
     dissipated: wp.array
     drag: wp.array
     speed: wp.array

@@ -1,5 +1,28 @@
 """Interactions: forces between bodies, or between bodies and something that moves beside them."""
 
 from .base import BoundInteraction, Interaction
+from .free import Free
+from .rigid import BoundRigidBody, RigidBody
+from .rigid_motion import Driven, Held, Moving, RigidMotion
+from .shapes import Box, Cylinder, Plane, Shape, Sphere
+from .skin import Skin
+from .triangle_mesh import TriangleMesh
 
-__all__ = ["BoundInteraction", "Interaction"]
+__all__ = [
+    "BoundInteraction",
+    "BoundRigidBody",
+    "Box",
+    "Cylinder",
+    "Driven",
+    "Free",
+    "Held",
+    "Interaction",
+    "Moving",
+    "Plane",
+    "RigidBody",
+    "RigidMotion",
+    "Shape",
+    "Skin",
+    "Sphere",
+    "TriangleMesh",
+]

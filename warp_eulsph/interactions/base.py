@@ -39,6 +39,12 @@ class BoundInteraction(ABC):
     recordable: bool = False
     sortable: bool = False
 
+    def start(self, world: "World") -> None:  # noqa: B027  (most need no more than bind knows)
+        """Prepare from the initial state, when references and surface vectors are there; called once."""
+
+    def rebuild(self, world: "World") -> None:  # noqa: B027
+        """Derive what the evolving arrays determine, after they were overwritten or particles changed places."""
+
     @abstractmethod
     def forces(self, world: "World", state: Any, fraction: float, out: wp.array) -> None:
         """Add forces [N] at ``state``, at time t + fraction · Δt, to ``out``, (n,) of vec by place.
@@ -66,6 +72,13 @@ class BoundInteraction(ABC):
 
     def energy(self, world: "World") -> float:
         """Energy [J] that it holds at ``world.U``, kinetic energy of its own included; reads the device."""
+        return 0.0
+
+    def supplied(self) -> float:
+        """Energy [J] put in from outside since the start, by a drive or weight of its own; reads the device.
+
+        It is in the account ``external`` of the ledger.
+        """
         return 0.0
 
     def evolving(self) -> dict[str, wp.array]:

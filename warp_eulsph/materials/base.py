@@ -54,6 +54,8 @@ class Law(NamedTuple):
         rebase: see below.
         viscosity: see below; None has none.
         heat: see below; None takes none.
+        secant: (h, constants) -> share in [0, 1] of the elastic stiffness in shear that stress over total strain still
+            is, by which positions are tied to F (M16): all of it where it is None, with h of the start too.
         history: the variables that the law remembers, in this order one row of reals per particle; the same in every
             dimension.
 
@@ -85,6 +87,7 @@ class Law(NamedTuple):
     rebase: Any = None
     viscosity: Any = None
     heat: Any = None
+    secant: Any = None
     history: tuple[Variable, ...] = ()
 
     @property

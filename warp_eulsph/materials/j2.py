@@ -234,4 +234,11 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
             out[2] = s * s * s * s
         return F_e, out
 
-    return law._replace(stress=stress, energy=energy, wave_moduli=wave_moduli, update=update, rebase=rebase)
+    @wp.func
+    def secant(h: row, c: Constants) -> real:
+        """Stress over total strain of monotonous loading, y/(y + 3μ α), that of slow flow."""
+        y = yield_stress(h[6], real(0.0), temperature(h), c)
+        return y / (y + real(3.0) * c.mu * h[6])
+
+    parts = {"stress": stress, "energy": energy, "wave_moduli": wave_moduli, "secant": secant}
+    return law._replace(**parts, update=update, rebase=rebase)

@@ -8,11 +8,11 @@ import warp as wp
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
-from ..structs import FluxArrays, ForceArrays, StateArrays
+from ..structs import StateArrays
 from .pair_forces import PairForces
 from .reference import Configuration
 from .sensor import Sensor
-from .stabiliser import Stabiliser
+from .stabiliser import Stabiliser, Sums
 
 
 @dataclass(frozen=True)
@@ -134,26 +134,17 @@ class UpwindForces(Stabiliser):
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
         """The portable kernels do, the SIMD pass makes its own."""
-        return sensed or not configuration.simd
+        return not configuration.pairs_by_simd(sensed)
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: FluxArrays,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: ForceArrays,
-    ) -> None:
-        """Internal force (M5) and dissipation (M9) into ``forces``."""
-        if not self.takes_dual(configuration, sensor is not None):
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5) and dissipation (M9)."""
+        configuration, forces, sensed = sums.configuration, sums.forces, sums.sensor is not None
+        if not self.takes_dual(configuration, sensed):
             if self._in_one_pass is None:
                 self._in_one_pass = PairForces(self.space, len(v), self.device)
-            self._in_one_pass.compute(configuration, flux, x, v, grad_v, epsilon, forces)
+            self._in_one_pass.compute(configuration, sums.flux, x, v, sums.grad_v, sums.epsilon, forces)
             return
-        configuration.divergence(flux.Pi, forces.internal)
-        arguments = [configuration.fields, configuration.near, flux, x, v, grad_v, epsilon]
-        arguments += [sensor if sensor is not None else v, forces.dissipation]
-        self._launch(make_dissipation(self.space, sensor is not None), len(v), arguments)
+        configuration.divergence(sums.flux.Pi, forces.internal)
+        arguments = [configuration.fields, configuration.near, sums.flux, x, v, sums.grad_v, sums.epsilon]
+        arguments += [sums.sensor if sensed else v, forces.dissipation]
+        self._launch(make_dissipation(self.space, sensed), len(v), arguments)

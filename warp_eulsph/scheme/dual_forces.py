@@ -8,9 +8,9 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..simd import BY_TWO_DUAL, packed_rows, prelude
 from ..space import Space
-from ..structs import FluxArrays, ForceArrays, StateArrays
+from ..structs import StateArrays
 from .reference import Configuration
-from .stabiliser import Stabiliser
+from .stabiliser import Stabiliser, Sums
 
 
 @functools.cache
@@ -106,22 +106,12 @@ class DualForces(Stabiliser):
         """The portable kernel does, the SIMD pass makes its own."""
         return not configuration.simd
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: FluxArrays,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: ForceArrays,
-    ) -> None:
-        """Internal force (M5) into ``forces``."""
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5)."""
+        configuration, internal = sums.configuration, sums.forces.internal
         if not configuration.simd:
-            configuration.divergence(flux.Pi, forces.internal)
+            configuration.divergence(sums.flux.Pi, internal)
             return
-        n = len(forces.internal)
-        self._launch(_make_pack(self.space), n, [configuration.fields, flux, self._rows])
+        self._launch(_make_pack(self.space), len(internal), [configuration.fields, sums.flux, self._rows])
         kernel = _make_forces(self.space, configuration.tilt is not None)
-        self._launch(kernel, n, [configuration.fields, configuration.near, self._rows, forces.internal])
+        self._launch(kernel, len(internal), [configuration.fields, configuration.near, self._rows, internal])

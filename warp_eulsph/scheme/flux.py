@@ -202,15 +202,16 @@ def _make_forget(space: Space, law: Law) -> wp.Kernel:
 
 
 @functools.cache
-def _make_update(space: Space, law: Law, fixed: bool) -> wp.Kernel:
+def _make_update(space: Space, law: Law, fixed: bool, tied: bool) -> wp.Kernel:
     """Kernel: the history after a full step and the energy that it dissipated; a step of length zero changes nothing.
 
-    A particle whose history is not finite is bad: its law found no state.
+    A particle whose history is not finite is bad: its law found no state. Where the law yields and is ``tied``, so does
+    the tie (M16).
     """
     real, mat, row, length = space.real, space.mat, history_row(space, law), len(law.start)
     Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
     Flux, Constants, updated = structure(space, "Flux"), law.Constants, law.update
-    rate_of = velocity_gradient(space, fixed)
+    rate_of, secant_of = velocity_gradient(space, fixed), law.secant
 
     @wp.kernel(module="unique", enable_backward=False)
     def update(
@@ -227,6 +228,8 @@ def _make_update(space: Space, law: Law, fixed: bool) -> wp.Kernel:
     ):
         a = first + wp.tid()
         flux.dissipated[a] = real(0.0)
+        if wp.static(tied):
+            flux.slipped[a] = real(0.0)
         dt = real(clock.dt[0])
         if dt > real(0.0):
             rate = rate_of(a, F[a], grad_v[a], reference)
@@ -234,6 +237,10 @@ def _make_update(space: Space, law: Law, fixed: bool) -> wp.Kernel:
             F[a] = F_a
             history[a - begin] = h
             flux.dissipated[a] = particles.V0[a] * lost
+            if wp.static(tied):
+                secant = wp.sqrt(secant_of(h, c))
+                flux.slipped[a] = (flux.secant[a] - secant) * flux.tied[a]
+                flux.secant[a] = secant
             nothing = real(0.0)  # NaN as soon as a component is not finite
             for i in range(wp.static(length)):
                 nothing += h[i] * real(0.0)
@@ -311,13 +318,14 @@ class Flux:
             self.parts.append(Part(first, count, law, material.filled_constants(law), history))
             first += count
         remembers = any(part.law.history for part in self.parts)
-        empty = ("Pi", "tie", "drag") if remembers else ("Pi", "tie", "drag", "dissipated")
+        empty = ["Pi", "tie", "drag", "secant", "tied", "slipped"] + ([] if remembers else ["dissipated"])
         self.fields: FluxArrays = allocate(space, "Flux", first, device, empty=empty)
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
 
     def evolving(self) -> dict[str, wp.array]:
-        """The histories of the bodies that have one; what a checkpoint must hold."""
-        return {f"Flux.history.{i}": part.history for i, part in enumerate(self.parts) if part.law.history}
+        """The histories of the bodies that have one, and what yielding left of the tie; what a checkpoint must hold."""
+        held = {f"Flux.history.{i}": part.history for i, part in enumerate(self.parts) if part.law.history}
+        return held | ({"Flux.secant": self.fields.secant} if len(self.fields.slipped) else {})
 
     def keep_dual(self) -> None:
         """Have ``compute`` write Π too, for forces that take it from the array (M5)."""
@@ -366,7 +374,8 @@ class Flux:
         for part in self.parts:
             if part.law.history and part.law.update is not None:
                 arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields, clock]
-                kernel = _make_update(self.space, part.law, configuration.fixed)
+                tied = part.law.secant is not None and len(self.fields.slipped) > 0
+                kernel = _make_update(self.space, part.law, configuration.fixed, tied)
                 self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
             elif part.law.update is not None:
                 self._launch(_make_forget(self.space, part.law), part.size, [F, part.constants], part.first)

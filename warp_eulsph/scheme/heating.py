@@ -14,7 +14,7 @@ from ..space import Space, difference
 from ..structs import ClockArrays, ParticleArrays
 from .dissipation import blend, upwind
 from .flux import Flux
-from .reference import Configuration
+from .stabiliser import Sums
 
 
 @functools.cache
@@ -132,12 +132,11 @@ class Heating:
         for kept, array in ((self._x, x), (self._v, v), (self._grad_v, grad_v)):
             wp.copy(kept, array)
 
-    def find(
-        self, configuration: Configuration, epsilon: float, sensor: wp.array | None, v: wp.array, clock: ClockArrays
-    ) -> None:
+    def find(self, sums: Sums, v: wp.array, clock: ClockArrays) -> None:
         """``heat`` of a step that ended with the velocities ``v`` [m/s], (n,) of vec."""
-        arguments = [configuration.fields, configuration.near, self.flux.fields, self._x, self._v, self._grad_v]
-        arguments += [epsilon, sensor if sensor is not None else self._v, self._v_old, v, clock, self.heat]
+        configuration, sensor = sums.configuration, sums.sensor
+        arguments = [configuration.fields, configuration.near, sums.flux, self._x, self._v, self._grad_v]
+        arguments += [sums.epsilon, self._v if sensor is None else sensor, self._v_old, v, clock, self.heat]
         self._launch(_make_heat(self.space, sensor is not None), len(v), arguments)
 
     def take(self, F: wp.array, clock: ClockArrays) -> None:

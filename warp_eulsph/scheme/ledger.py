@@ -14,7 +14,7 @@ from ..space import Space, matrix_type, vector_type
 from ..structs import ParticleArrays, StateArrays
 from .exchanges import Exchanges
 from .medium import Medium
-from .powers import loads_power, lost, note, powers, work
+from .powers import loads_power, lost, note, powers, slipped, work
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
@@ -35,7 +35,14 @@ _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 @functools.cache
 def _make_entries(
-    space: Space, tied: bool, dragged: bool, limited: bool, smoothed: bool, damped: bool, inelastic: bool
+    space: Space,
+    tied: bool,
+    dragged: bool,
+    limited: bool,
+    smoothed: bool,
+    damped: bool,
+    inelastic: bool,
+    yielding: bool,
 ) -> wp.Kernel:
     """Kernel of ``SumOfParticles``: what each mechanism did in this step, by the mean velocity of the step.
 
@@ -44,7 +51,8 @@ def _make_entries(
     The limiter's is m Δv·v̄ plus the stored energy ΔW_limited that its change of F made, taken out of ΔW. Where the
     scheme smooths v in every step (``smoothed``, one-step Lax), Δv is that of S and m Δv·v̄ belongs to the stepping.
     The tie's is the power of its force and of its stress, which Q holds and W does not (M16); the dissipation's too,
-    where it has a stress (M9). The material's is what the laws say that they dissipated (``inelastic``).
+    where it has a stress (M9). The material's is what the laws say that they dissipated (``inelastic``), and what the
+    tie lost where they yield (``yielding``).
     """
     vec, mat = space.vec, space.mat
     Particles, Reference, State = (
@@ -54,6 +62,7 @@ def _make_entries(
     )
     Forces, Clock, wide = structure(space, "Forces"), clock_structure(space), wp.float64
     Flux, keep, work_of, lost_of = structure(space, "Flux"), note(space), work(space), lost(space, inelastic)
+    slipped_of = slipped(space, yielding)
     precise, pairs_power = vector_type(space.dim, wp.float64), powers(space, tied, dragged)
     power_of = loads_power(space, damped)
     precise_mat = matrix_type(space.dim, space.dim, wp.float64)
@@ -87,7 +96,7 @@ def _make_entries(
             strain_rate = precise_mat(grad_v[a]) * wide(reference.V[a])
             of_pairs = pairs_power(a, flux, strain_rate)
             strain_power = wp.ddot(precise_mat(flux.Q[a]), strain_rate) - of_pairs[0] - of_pairs[1]
-            lost = lost_of(a, flux)
+            lost, slip = lost_of(a, flux), slipped_of(a, flux)
             stepping = W[a] - W_old[a] + lost - dt * strain_power
             stepping += dt * work_of(forces.internal[a], v_mean - precise(half.v[a]))
             limiter = wide(0.0)
@@ -102,9 +111,9 @@ def _make_entries(
                 wp.dot(impulse, v_mean),
                 dt * loads[1],
                 dt * (work_of(forces.dissipation[a], v_mean) - of_pairs[1]),
-                -lost,
+                -lost - slip,
                 dt * work_of(forces.correction[a], v_mean),
-                dt * (work_of(forces.tie[a], v_mean) - of_pairs[0]),
+                dt * (work_of(forces.tie[a], v_mean) - of_pairs[0]) + slip,
                 limiter,
                 stepping,
                 wide(0.0),
@@ -286,7 +295,8 @@ class Ledger:
             arguments += [self.clock.fields, medium.forces]
             tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
             limits, smooths, inelastic = limiter is not None, smoothed is not None, len(flux.fields.dissipated) > 0
-            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped, inelastic)
+            yielding = len(flux.fields.slipped) > 0
+            kernel = _make_entries(self.space, tied, dragged, limits, smooths, self._damped, inelastic, yielding)
             self._book(page, kernel, arguments)
 
     def book_shift(self, U: StateArrays) -> None:
@@ -334,7 +344,10 @@ class Ledger:
     def accounts(self) -> dict[str, float]:
         """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
         found = dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
-        return found | ({} if self._exchanges is None else {"interaction": sum(self.exchanged())})
+        if self._exchanges is not None:
+            found["external"] += self._exchanges.supplied()
+            found["interaction"] = sum(self.exchanged())
+        return found
 
     def made(self) -> float:
         """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""

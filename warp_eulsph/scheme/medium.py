@@ -22,8 +22,8 @@ from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
 from .shifting import Shifter
-from .stabiliser import Stabiliser
-from .updates import make_drift, make_kick, make_predict
+from .stabiliser import Stabiliser, Sums
+from .updates import make_drift, make_kick, make_mean, make_predict
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,11 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
+        surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
         heating: None where no law takes heat.
         particles, forces, grad_v: of its own particles, views of what the world has.
+        steady: its steps begin with the ∇_k v that the one before kept.
     """
 
     def __init__(self, space: Space, parts: MediumParts, conditions: Sequence[Bound], device: wp.DeviceLike):
@@ -83,6 +85,7 @@ class Medium:
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
+        self.surface_given = parts.surface_given
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
@@ -100,7 +103,7 @@ class Medium:
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            simd, upwind = self.configuration.simd and not sensed, options.dissipation if plain else None
+            simd, upwind = self.configuration.pairs_by_simd(sensed), options.dissipation if plain else None
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
@@ -129,6 +132,14 @@ class Medium:
         self._own_half = part(self.space, half, "State", self.span)
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
+        upwind, flux = self.options.dissipation, self.flux.fields
+        epsilon = 0.0 if upwind is None else upwind.epsilon
+        d = None if upwind is None or upwind.sensor is None else self.sensors[upwind.sensor].d
+        self.sums = Sums(self.configuration, flux, self.grad_v, self.forces, epsilon, d)
+
+    def keep_gradients(self, on: bool) -> None:
+        """Whether each step leaves ∇_k v^{n+1} for the next one."""
+        self.steady, self.kept = on, wp.zeros_like(self.grad_v) if on else self.grad_v
 
     @property
     def heats(self) -> bool:
@@ -202,9 +213,33 @@ class Medium:
 
     # the lines of a step
 
-    def velocity_gradient(self, state: StateArrays) -> None:
-        """∇_k v (M4)."""
-        self.configuration.gradient(self.of(state).v, self.grad_v)
+    def velocity_gradient(self, state: StateArrays, out: wp.array | None = None) -> None:
+        """∇_k v (M4), into ``grad_v`` by default."""
+        self.configuration.gradient(self.of(state).v, self.grad_v if out is None else out)
+
+    def keep_gradient(self, state: StateArrays) -> None:
+        """∇_k v of a state in which a step begins, where it is kept."""
+        if self.steady:
+            self.velocity_gradient(state, self.kept)
+
+    def known_gradient(self, state: StateArrays) -> None:
+        """∇_k v of the state in which a step begins, that which was kept where it was."""
+        if self.steady:
+            wp.copy(self.grad_v, self.kept)
+        else:
+            self.velocity_gradient(state)
+
+    def mean_gradient(self, state: StateArrays, mean: StateArrays) -> None:
+        """∇_k v of ``mean``; as M4 is linear, where all is steady from ∇_k vⁿ and that of ``state``, which is kept."""
+        if self.steady:
+            self.keep_gradient(state)
+            self._launch(make_mean(self.space, "mat"), self.n, [self.kept, self.grad_v])
+        else:
+            self.velocity_gradient(mean)
+
+    def release(self, state: StateArrays) -> None:
+        """The velocity before conditions are imposed."""
+        wp.copy(self.forces.free_v, self.of(state).v)
 
     def gradients(self, state: StateArrays) -> None:
         """∇_k v, and ∇_k F where the smoothing needs it (M4)."""
@@ -231,20 +266,11 @@ class Medium:
     def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
         at, v = self.of(state), self.of(rates).v
-        epsilon, d = self._dissipation()
         if self.heating is not None:
             self.heating.note(at.x, v, self.grad_v)
         if self.pairs is not None:
-            self.pairs.compute(self.configuration, at, v, self.grad_v, epsilon, d, self.forces)
-        arguments = (self.configuration, self.flux.fields, at.x, v, self.grad_v, epsilon, d, self.forces)
-        self.stabiliser.compute(*arguments)
-
-    def _dissipation(self) -> tuple[float, wp.array | None]:
-        """ε and d of M9."""
-        option = self.options.dissipation
-        if option is None:
-            return 0.0, None
-        return option.epsilon, None if option.sensor is None else self.sensors[option.sensor].d
+            self.pairs.compute(self.sums, at, v)
+        self.stabiliser.compute(self.sums, at.x, v)
 
     def smooth(self, state: StateArrays, out: StateArrays) -> None:
         """S of v and F (M6, M7)."""
@@ -281,7 +307,7 @@ class Medium:
     def find_heat(self, state: StateArrays) -> None:
         """What M9 took in the step that ended in ``state``, particle by particle."""
         if self.heating is not None:
-            self.heating.find(self.configuration, *self._dissipation(), self.of(state).v, self.clock)
+            self.heating.find(self.sums, self.of(state).v, self.clock)
 
     def heat(self, state: StateArrays) -> None:
         """That heat into the laws."""

@@ -11,11 +11,11 @@ from ..fields import neighbour_structure, structure
 from ..operators.laplacian import LaplacianSolver
 from ..reduce import Sum
 from ..space import Space, difference
-from ..structs import FluxArrays, ForceArrays, ParticleArrays, StateArrays
+from ..structs import ParticleArrays, StateArrays
 from .dissipation import UpwindForces, blend, upwind
 from .flux import Flux
 from .reference import Configuration
-from .stabiliser import Correction, Stabiliser
+from .stabiliser import Correction, Stabiliser, Sums
 
 
 @dataclass(frozen=True)
@@ -193,26 +193,17 @@ class ClosedPairs(Stabiliser):
         """The potentials: in use until the next refresh, whose first guess they are."""
         return {"ClosedPairs.psi": self.solver.psi}
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: FluxArrays,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: ForceArrays,
-    ) -> None:
-        """Internal force (M5), dissipation (M9) and correction (M11, M12) into ``forces``."""
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5), dissipation (M9) and correction (M11, M12)."""
+        configuration, flux, forces = sums.configuration, sums.flux, sums.forces
         if self.option.limited:
             configuration.divergence(flux.Pi, forces.internal)
-            arguments = [configuration.fields, configuration.near, flux, x, v, grad_v, epsilon]
-            arguments += [sensor if sensor is not None else v, self.solver.psi, self.option.kappa]
+            arguments = [configuration.fields, configuration.near, flux, x, v, sums.grad_v, sums.epsilon]
+            arguments += [sums.sensor if sums.sensor is not None else v, self.solver.psi, self.option.kappa]
             arguments += [forces.dissipation, self.admission]
-            self._launch(_make_dissipate(self.space, sensor is not None), len(v), arguments)
+            self._launch(_make_dissipate(self.space, sums.sensor is not None), len(v), arguments)
         else:
-            self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
+            self.upwind.compute(sums, x, v)
         arguments = [configuration.fields, configuration.near, flux.Q, v, self.solver.psi, self.admission]
         arguments += [forces.correction]
         self._launch(_make_correct(self.space, self.option.limited), len(v), arguments)

@@ -6,21 +6,21 @@ from collections.abc import Sequence
 import warp as wp
 
 from ..execution import Launcher
-from ..fields import neighbour_structure, structure
+from ..fields import neighbour_structure, repeated, structure
 from ..linalg import inverse
 from ..simd import BY_EIGHT_LARGER, OWN_ROW, packed_rows, prelude
 from ..space import Space, difference
-from ..structs import ForceArrays, StateArrays
+from ..structs import StateArrays
 from .dissipation import Upwind, blend, upwind
 from .flux import Flux
 from .pair_forces import SQUARES
-from .reference import Configuration
+from .stabiliser import Sums
 from .tie import Tie
 from .turning import TURNING, make_spin, make_turned
 
 
 def _vectors(space: Space) -> int:
-    """Rows of four: X and impedance, u, v and shear impedance, columns of −½(F − I) and −½∇v (F⁻¹), −½ spin."""
+    """Rows of four: X, u, v with impedance, √secant, shear impedance; columns of −½(F − I), −½∇v (F⁻¹); −½ spin."""
     return 4 + 2 * space.dim
 
 
@@ -53,7 +53,7 @@ def _make_pack(space: Space, stressed: bool) -> wp.Kernel:
         rows[a, first_spin + 3] = real(0.0)
         u_a, H_a = x[a] - X_a, F[a] - wp.identity(n=wp.static(dim), dtype=real)
         rows[a, 3] = flux.impedance[a]
-        rows[a, 7] = real(0.0)
+        rows[a, 7] = flux.secant[a]
         rows[a, 11] = flux.shear_impedance[a]
         for j in range(wp.static(dim)):
             rows[a, first_H + 4 * j + 3] = real(0.0)
@@ -70,8 +70,11 @@ def _make_pack(space: Space, stressed: bool) -> wp.Kernel:
 
 
 @functools.cache
-def _make_simd(space: Space, stressed: bool) -> wp.Kernel:
-    """Kernel of the pass from packed rows, without a sensor; M9 has a stress where ``stressed``."""
+def _make_simd(space: Space, stressed: bool, yielding: bool) -> wp.Kernel:
+    """Kernel of the pass from packed rows, without a sensor; M9 has a stress where ``stressed``.
+
+    What a tie that yields holds is kept where ``yielding``.
+    """
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
@@ -83,10 +86,10 @@ def _make_simd(space: Space, stressed: bool) -> wp.Kernel:
     constexpr int vectors = {_vectors(space)};
     const Q* const all = (const Q*)rows.data;
     {OWN_ROW}
-    // impedances are added where the rest is subtracted
-    const V X_a = mine(0, -1), u_a = mine(1, 1), v_a = mine(2, -1);
+    // impedances are added where the rest is subtracted, secants are as they are
+    const V X_a = mine(0, -1), u_a = mine(1, 0), v_a = mine(2, -1);
     const V spin_a = mine(3 + 2 * dim, 1);
-    V H_a[dim], grad_a[dim], tie[dim], drag[dim], tied[dim * dim], dragged[dim * dim];
+    V H_a[dim], grad_a[dim], tie[dim], drag[dim], tied[dim * dim], dragged[dim * dim], held = 0;
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
         H_a[j] = mine(3 + j, 1);
@@ -119,12 +122,13 @@ def _make_simd(space: Space, stressed: bool) -> wp.Kernel:
         turn(spin, S);
         {turning}
         {SQUARES}
-        const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon), stiffness = w * modulus;
+        const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon), stiffness = w * R[3] * modulus;
         const V Z = X[3], Z_shear = J[3], normal = along * (Z - Z_shear) * (area / nn), shear = Z_shear * area;
         #pragma unroll
         for (int i = 0; i < dim; ++i) {{
             const V pull = R[i] * stiffness, push = N[i] * normal + J[i] * shear;
             tie[i] += pull;
+            if ({int(yielding)}) held += pull * R[i];
             drag[i] += push;
             #pragma unroll
             for (int j = 0; j < dim; ++j) tied[i * dim + j] += pull * X[j];
@@ -132,12 +136,13 @@ def _make_simd(space: Space, stressed: bool) -> wp.Kernel:
         }}
     }};
     {BY_EIGHT_LARGER}
+    if ({int(yielding)}) helds.data[a] = total(held) * (V_a * T(0.5));
     #pragma unroll
     for (int i = 0; i < dim; ++i) {{
-        ties.data[a].c[i] = total(tie[i]) * V_a;
+        ties.data[a].c[i] = total(tie[i]) * (V_a * secant);
         drags.data[a].c[i] = total(drag[i]) * V_a;
         #pragma unroll
-        for (int j = 0; j < dim; ++j) tie_stress.data[a].data[i][j] = total(tied[i * dim + j]) * T(-0.5);
+        for (int j = 0; j < dim; ++j) tie_stress.data[a].data[i][j] = total(tied[i * dim + j]) * (T(-0.5) * secant);
         if ({int(stressed)})
             for (int j = 0; j < dim; ++j) drag_stress.data[a].data[i][j] = total(dragged[i * dim + j]) * T(-0.5);
     }}
@@ -154,8 +159,10 @@ def _make_simd(space: Space, stressed: bool) -> wp.Kernel:
         box: vec,
         rows: wp.array2d(dtype=real),
         modulus: real,
+        secant: real,
         epsilon: real,
         V_a: real,
+        helds: wp.array(dtype=real),
         ties: wp.array(dtype=vec),
         drags: wp.array(dtype=vec),
         tie_stress: wp.array(dtype=mat),
@@ -177,8 +184,26 @@ def _make_simd(space: Space, stressed: bool) -> wp.Kernel:
         a = first + wp.tid()
         begin, end, V_a = near.start[a], near.start[a + 1], reference.V[a]
         index, w, own, box = near.index, near.w, near.own, near.box
-        tie, drag = forces.tie, forces.dissipation
-        sum_pairs(a, begin, end, index, w, own, box, rows, modulus, epsilon, V_a, tie, drag, flux.tie, flux.drag)
+        tie, drag, held = forces.tie, forces.dissipation, flux.tied
+        sum_pairs(
+            a,
+            begin,
+            end,
+            index,
+            w,
+            own,
+            box,
+            rows,
+            modulus,
+            flux.secant[a],
+            epsilon,
+            V_a,
+            held,
+            tie,
+            drag,
+            flux.tie,
+            flux.drag,
+        )
         flux.Q[a] = flux.Q[a] + flux.tie[a]
         if wp.static(stressed):
             flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
@@ -201,7 +226,7 @@ def _make_spatial(space: Space) -> wp.Kernel:
 
 
 @functools.cache
-def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dual: bool) -> wp.Kernel:
+def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dual: bool, yielding: bool) -> wp.Kernel:
     """Kernel of the pass; M9 where ``damped``, reconstructed only where v is smooth if ``sensed``.
 
     With a stress (``stressed``) the jump is reconstructed by D = ∇v F⁻¹ between the pair as it is now; without by ∇v in
@@ -234,6 +259,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
         a = first + wp.tid()
         tie, drag = vec(), vec()
         tied, dragged = mat(), mat()
+        held = real(0.0)
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], reference.x[a], near.box)
@@ -241,8 +267,9 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
             now = xi + ((x[b] - reference.x[b]) - (x[a] - reference.x[a]))
             w = near.w[k] + wp.abs(near.w[k] - near.own[k])
             off = now - (F[a] + F[b]) @ (xi * real(0.5))
-            pull = off * (modulus * w)
+            pull = off * (modulus * w * flux.secant[b])
             tie += pull
+            held += wp.dot(pull, off)
             tied += wp.outer(pull, xi)
             if wp.static(damped):
                 plain = v[b] - v[a]
@@ -252,18 +279,20 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
                 else:
                     jump -= (grad_v[a] + grad_v[b]) @ (xi * real(0.5))
                     jump -= turned(spin_of(D[a] + D[b]) * real(0.5), off, wp.length(xi) * real(0.5))
+                jump = jump * epsilon
                 if wp.static(sensed):
-                    jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
-                else:
-                    jump = jump * epsilon
+                    jump = mix(jump, plain * epsilon, real(1.0), sensor[a], sensor[b])
                 Z = flux.impedance[a] + flux.impedance[b]
                 Z_shear = flux.shear_impedance[a] + flux.shear_impedance[b]
                 push = pair_force(xi, now, w, Z, Z_shear, jump)
                 drag += push
                 if wp.static(stressed):
                     dragged += wp.outer(push, now)
-        forces.tie[a] = tie * reference.V[a]
-        flux.tie[a] = tied * real(-0.5)
+        if wp.static(yielding):
+            flux.tied[a] = real(0.5) * held * reference.V[a]
+        secant = flux.secant[a]
+        forces.tie[a] = tie * (reference.V[a] * secant)
+        flux.tie[a] = tied * (real(-0.5) * secant)
         flux.Q[a] = flux.Q[a] + flux.tie[a]
         if wp.static(damped):
             forces.dissipation[a] = drag * reference.V[a]
@@ -301,7 +330,7 @@ class PairPotentials:
         groups: Sequence[int],
         device: wp.DeviceLike,
     ):
-        self.space, self.flux, self._launch = space, flux, Launcher(device)
+        self.space, self._launch = space, Launcher(device)
         damped = dissipation is not None
         self._damped, self._simd = damped, simd and damped
         self._stressed = dissipation is not None and dissipation.stress
@@ -312,31 +341,40 @@ class PairPotentials:
         self._rows = packed_rows(space, n if self._simd else 0, _vectors(space), device)
         self._D = wp.zeros(n if damped and not self._simd else 0, dtype=space.mat, device=device)
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
+        self._one = wp.ones(1, dtype=space.real, device=device)
+        flux.fields.secant = repeated(self._one, n)
+        self._yielding = tie is not None and any(part.law.secant is not None for part in flux.parts)
+        if self._yielding:
+            flux.fields.secant = wp.ones(n, dtype=space.real, device=device)
+            flux.fields.tied, flux.fields.slipped = (wp.zeros(n, dtype=space.real, device=device) for _ in range(2))
         if self._stressed:
             flux.fields.drag = wp.zeros(n, dtype=space.mat, device=device)
 
-    def compute(
-        self,
-        configuration: Configuration,
-        state: StateArrays,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: ForceArrays,
-    ) -> None:
-        """Forces [N] at x and F of ``state``, ``v`` and ``grad_v``, and their stresses, which are added to Q."""
-        reference, near, flux = configuration.fields, configuration.near, self.flux.fields
+    def compute(self, sums: Sums, state: StateArrays, v: wp.array) -> None:
+        """Forces [N] at x and F of ``state`` and velocities ``v``, and their stresses, which are added to Q."""
+        reference, near, flux = sums.configuration.fields, sums.configuration.near, sums.flux
+        grad_v, epsilon, forces = sums.grad_v, sums.epsilon, sums.forces
         if self._simd:
             arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
             self._launch(_make_pack(self.space, self._stressed), len(v), arguments)
+            kernel = _make_simd(self.space, self._stressed, self._yielding)
             for body, modulus in self._bodies:
                 arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
-                self._launch(_make_simd(self.space, self._stressed), len(body), arguments, body.start)
+                self._launch(kernel, len(body), arguments, body.start)
             return
         if self._damped:
             self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
-        kernel = _make_portable(self.space, self._damped, self._stressed, sensor is not None, len(flux.Pi) > 0)
+        sensed, dual = sums.sensor is not None, len(flux.Pi) > 0
+        kernel = _make_portable(self.space, self._damped, self._stressed, sensed, dual, self._yielding)
         for body, modulus in self._bodies:
-            arguments = [reference, near, state.x, state.F, v, grad_v, self._D, v if sensor is None else sensor]
+            arguments = [
+                reference,
+                near,
+                state.x,
+                state.F,
+                v,
+                grad_v,
+                self._D,
+                v if sums.sensor is None else sums.sensor,
+            ]
             self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)

@@ -52,6 +52,20 @@ def lost(space: Space, inelastic: bool) -> wp.Function:
 
 
 @functools.cache
+def slipped(space: Space, yielding: bool) -> wp.Function:
+    """``wp.func``: energy that a tie lost by yielding in the step (M16), 0 where none does."""
+    Flux = structure(space, "Flux")
+
+    @wp.func
+    def slipped(a: int, flux: Flux) -> wp.float64:
+        if wp.static(yielding):
+            return wp.float64(flux.slipped[a])
+        return wp.float64(0.0)
+
+    return slipped
+
+
+@functools.cache
 def powers(space: Space, tied: bool, dragged: bool) -> wp.Function:
     """``wp.func``: power [W] of the stresses in Q of a particle that are the tie's and the dissipation's."""
     Flux, precise_mat = structure(space, "Flux"), matrix_type(space.dim, space.dim, wp.float64)

@@ -191,6 +191,10 @@ class Configuration:
         """Struct of the neighbour rows."""
         return self.lists.rows
 
+    def pairs_by_simd(self, sensed: bool) -> bool:
+        """Whether passes over pairs run by SIMD kernels, which know of no sensor; else by the portable ones."""
+        return self.simd and not sensed
+
     def refresh(self, state: StateArrays) -> None:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
         BY_HOST(lambda: self.move(state), [self.lists], self.renew)

@@ -1,6 +1,7 @@
 """What keeps the sums of a reference stable: dissipation, and the correction of what the arrangement gets wrong."""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import ClassVar
 
 import warp as wp
@@ -24,6 +25,27 @@ class Correction(ABC):
         """Allocate for the bodies of ``flux``."""
 
 
+@dataclass(frozen=True)
+class Sums:
+    """What the forces on a medium are summed from, and where they go.
+
+    Attributes:
+        configuration: its reference k.
+        flux: stress and impedances.
+        grad_v: ∇_k v [1/s] (M4), (n,) of mat.
+        forces: written.
+        epsilon: share of the upwind flux (M9), 0 where nothing dissipates.
+        sensor: (n,) of vec in [0, 1] that switches M9 to first order; None without.
+    """
+
+    configuration: Configuration
+    flux: FluxArrays
+    grad_v: wp.array
+    forces: ForceArrays
+    epsilon: float = 0.0
+    sensor: wp.array | None = None
+
+
 class Stabiliser(ABC):
     """The stabilising forces at work on one set of particles."""
 
@@ -45,15 +67,5 @@ class Stabiliser(ABC):
         return {}
 
     @abstractmethod
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: FluxArrays,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: ForceArrays,
-    ) -> None:
-        """Internal force (M5), dissipation (M9, ε, switched by ``sensor``, at x and v) and correction [N]."""
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5), dissipation (M9, at x and v) and correction [N], into ``sums.forces``."""

@@ -7,12 +7,12 @@ import warp as wp
 
 from ..execution import Launcher
 from ..space import Space
-from ..structs import FluxArrays, ForceArrays, ParticleArrays, StateArrays
+from ..structs import ParticleArrays, StateArrays
 from .dissipation import UpwindForces
 from .flux import Flux
 from .projection import Projection
 from .reference import Configuration
-from .stabiliser import Correction, Stabiliser
+from .stabiliser import Correction, Stabiliser, Sums
 
 
 @dataclass(frozen=True)
@@ -73,20 +73,10 @@ class SurfaceForces(Stabiliser):
         """The defect: of the surface vectors at the last refresh, which are not kept."""
         return {"SurfaceForces.defect": self.defect}
 
-    def compute(
-        self,
-        configuration: Configuration,
-        flux: FluxArrays,
-        x: wp.array,
-        v: wp.array,
-        grad_v: wp.array,
-        epsilon: float,
-        sensor: wp.array | None,
-        forces: ForceArrays,
-    ) -> None:
-        """Internal force (M5), dissipation (M9) and correction (M10) into ``forces``."""
-        self.upwind.compute(configuration, flux, x, v, grad_v, epsilon, sensor, forces)
-        arguments = [flux.Q, self.defect, forces.correction]
+    def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
+        """Internal force (M5), dissipation (M9) and correction (M10)."""
+        self.upwind.compute(sums, x, v)
+        arguments = [sums.flux.Q, self.defect, sums.forces.correction]
         self._launch(_make_correction(self.space), len(v), arguments)
         if self.projection is not None:
-            self.projection(configuration.fields.x, forces.correction)
+            self.projection(sums.configuration.fields.x, sums.forces.correction)

@@ -12,7 +12,9 @@ class Tie:
     push particles about in them. r vanishes for linear fields, and for quadratic ones as far as F is exact there.
     Both momenta and energy are exact; what is stored in the tie comes back (``energy()["tied"]``).
 
-    It acts where the arrangement does not move, whose initial positions are the labels ξ⁰.
+    It acts where the arrangement does not move, whose initial positions are the labels ξ⁰. Where matter yields χ Ē goes
+    with the secant of its law (``Law.secant``), as the root of the product of both ends'; what the tie loses by that is
+    the material's.
 
     Args:
         stiffness: χ, over Ē, the modulus of pressure waves M or 4μ, whichever is less: M where Poisson's ratio is ⅓.

@@ -16,6 +16,7 @@ import warp as wp
 
 from ..fields import allocate
 from ..scheme.dissipation import UpwindForces
+from ..scheme.stabiliser import Sums
 from ..simulation import Simulation
 from ..structs import ForceArrays
 from .stability_step import Point, Step
@@ -103,5 +104,5 @@ def _dissipate(simulation: Simulation, v: wp.array) -> np.ndarray:
     forces: ForceArrays = allocate(space, "Forces", len(v), simulation.device)
     upwind = UpwindForces(space, simulation.device)
     grad_v = _gradient(simulation, v)
-    upwind.compute(stepper.configuration, stepper.flux.fields, stepper.U.x, v, grad_v, 1.0, None, forces)
+    upwind.compute(Sums(stepper.configuration, stepper.flux.fields, grad_v, forces, 1.0), stepper.U.x, v)
     return forces.dissipation.numpy()

@@ -47,7 +47,7 @@ TUBES = {
 def build(n: int, tube: Tube, **options: Any) -> Simulation:
     """The tube as n particles along its axis."""
     x = (np.arange(n) + 0.5) / n
-    bodies = []
+    bodies: list[Body] = []
     for name, state, part in (("left", tube.left, x < tube.wall), ("right", tube.right, x >= tube.wall)):
         gas = StiffenedGas(density=state.density, gamma=state.gamma, stiffness=state.stiffness, pressure=state.pressure)
         bond = "left" if bodies else None
