@@ -74,7 +74,7 @@ def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> wp.Kernel:
 
 @functools.cache
 def rate_with_viscosity(real: type) -> wp.Function:
-    """``wp.func`` (rate of waves r, rate of viscosity s = ν/length²) -> what Δt is to be counted by [1/s].
+    """``wp.func`` (rate of waves r, of viscosity s) -> what Δt is to be counted by [1/s] (M22).
 
     Waves of the frequency ω ≤ 2 r and the decay λ ≤ 4 s, of the same operator, are stable in a step that takes the
     viscous force at its start where (ω Δt)² + 2 λ Δt ≤ 4, by determinant and trace of a step: r² Δt² + 2 s Δt ≤ 1.

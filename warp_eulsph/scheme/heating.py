@@ -19,7 +19,7 @@ from .stabiliser import Sums
 
 @functools.cache
 def _make_heat(space: Space, sensed: bool) -> wp.Kernel:
-    """Kernel: ½ Δt Σ_b D_ab·(v̄_b − v̄_a), with D_ab of M9 and v̄ the mean velocity of the step.
+    """Kernel: ½ Δt Σ_b D_ab·(v̄_b − v̄_a), with D_ab of M9 and v̄ the mean velocity of the step (M21).
 
     By it a force changes the kinetic energy by exactly Δt D_ab·v̄, so that what pairs lose is what they are heated by.
     """
