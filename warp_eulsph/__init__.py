@@ -28,7 +28,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
-from .interactions import Interaction
+from .interactions import Contact, Interaction
 from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
@@ -81,6 +81,7 @@ __all__ = [
     "Boundary",
     "BrokenError",
     "Clamped",
+    "Contact",
     "Convected",
     "Correction",
     "CubicSpline",

@@ -1,6 +1,7 @@
 """Interactions: forces between bodies, or between bodies and something that moves beside them."""
 
 from .base import BoundInteraction, Interaction
+from .contact import Contact
 from .free import Free
 from .rigid import BoundRigidBody, RigidBody
 from .rigid_motion import Driven, Held, Moving, RigidMotion
@@ -12,6 +13,7 @@ __all__ = [
     "BoundInteraction",
     "BoundRigidBody",
     "Box",
+    "Contact",
     "Cylinder",
     "Driven",
     "Free",

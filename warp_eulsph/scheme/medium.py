@@ -103,7 +103,8 @@ class Medium:
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            simd, upwind = self.configuration.pairs_by_simd(sensed), options.dissipation if plain else None
+            upwind = options.dissipation if plain else None
+            simd = self.configuration.pairs_by_simd(sensed and plain)
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
