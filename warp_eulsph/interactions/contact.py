@@ -112,6 +112,7 @@ class BoundContact(BoundInteraction):
             setattr(self._arrays, name, getattr(self.skin, name))
         k, n, device = len(self.skin.indices), world.n, world.device
         self._energy = wp.zeros(k, dtype=wp.float64, device=device)
+        self._slope = wp.zeros(k, dtype=self.space.vec, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
         self.slip = wp.zeros(k if self.rubs else 0, dtype=self.space.vec, device=device)
         self._found_at = wp.zeros(k if self.skin.changes else 0, dtype=self.space.vec, device=device)
@@ -164,8 +165,9 @@ class BoundContact(BoundInteraction):
         if self.nearby.pairs:
             self.skin.look(state)
             arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.clock.fields, fraction]
-            arguments += [self.option.friction, self.slip, out, self._energy]
+            arguments += [self.option.friction, self.slip, out, self._slope, self._energy]
             self._launch(make_push(self.space, self.rubs), len(self.skin.indices), arguments)
+            self.skin.turn(state, self._slope, out)
         return self.nearby.pairs > 0
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
@@ -192,5 +194,10 @@ class BoundContact(BoundInteraction):
     def evolving(self) -> dict[str, wp.array]:
         held = {"slip": self.slip} if self.rubs else {}
         if self.skin.changes:
-            held |= {"found_at": self._found_at, "there": self.skin.there, "area": self.skin.area}
+            held |= {
+                "found_at": self._found_at,
+                "there": self.skin.there,
+                "area": self.skin.area,
+                "bend": self.skin.bend,
+            }
         return held
