@@ -27,7 +27,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
-from .interactions import Contact, Interaction
+from .interactions import Contact, Interaction, RigidBody
 from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
@@ -113,6 +113,7 @@ __all__ = [
     "QuinticSpline",
     "ReferencePolicy",
     "Region",
+    "RigidBody",
     "Roller",
     "SaintVenantKirchhoff",
     "Scheme",
