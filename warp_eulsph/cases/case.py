@@ -36,7 +36,7 @@ class MirrorPlane(Table):
     depth: Number | None = Field(
         None, description="particles this near get a ghost [m]; three support radii by default"
     )
-    image: choice(Image) = Field("Wall", validate_default=True, description="Wall, or Antisymmetry for a linear law")  # type: ignore[valid-type]
+    image: choice(Image) = Field("Wall", validate_default=True, description="Wall, NoSlip or Antisymmetry")  # type: ignore[valid-type]
 
 
 class BodyTable(Table):

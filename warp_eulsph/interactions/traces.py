@@ -6,7 +6,7 @@ y = Σ_c ω_c x_c lies half a layer outside of the outermost particle. A force o
 weights: it does on them the work that it does on y, and it has the moment of a force that acts at y.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..boundaries import Assembly
 from ..boundaries.face import SMOOTH, surfaces_held
 from ..boundaries.named_surface import flat_faces
 from ..boundaries.outermost import Surface, nearest, pairs, surface_particles
+from ..structs import StateArrays
 
 # Area vectors of a column below which, and above which, they are noise of an arrangement: parts of a particle's face.
 LEAST, MOST = 0.5, 2.0
@@ -40,7 +41,7 @@ class Traces(NamedTuple):
     tops: np.ndarray
 
 
-def find_traces(assembly: Assembly, state: Any, indices: np.ndarray, flowing: np.ndarray, who: str) -> Traces:
+def find_traces(assembly: Assembly, state: StateArrays, indices: np.ndarray, flowing: np.ndarray, who: str) -> Traces:
     """The traces of all bodies of which ``indices`` hold particles, to be asked for at the start of a run.
 
     Where ``flowing``, (n,) bool by number, particles change places: there each one is a point of its own, with half a

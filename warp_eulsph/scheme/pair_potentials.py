@@ -293,7 +293,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
                     jump -= turned(spin_of(D[a] + D[b]) * real(0.5), off, wp.length(xi) * real(0.5))
                 jump = jump * epsilon
                 if wp.static(sensed):
-                    jump = mix(jump, plain, real(1.0), sensor[a], sensor[b])
+                    jump = mix(jump, plain * epsilon, real(1.0), sensor[a], sensor[b])
                 Z = flux.impedance[a] + flux.impedance[b]
                 Z_shear = flux.shear_impedance[a] + flux.shear_impedance[b]
                 push = pair_force(xi, now, w, Z, Z_shear, jump)
