@@ -94,7 +94,7 @@ def pressure(space: Space) -> Any:
 
 @functools.cache
 def meeting(space: Space) -> Any:
-    """``wp.func`` (skin, lower, upper, d) -> normal n of the pair, row (r, r0, |r_t|, h, share · A_a A_b, q, q', slope).
+    """``wp.func`` (skin, lower, upper, d) -> normal n, row (r, r0, |r_t|, h, share · A_a A_b, q, q', slope).
 
     q and q' are how much n follows the normals of both, ∂n/∂n_a = q (1 − n⊗n) and ∂n/∂n_b = −q' (1 − n⊗n); the slope is
     that of share · A_a A_b with n_a·n_b.
