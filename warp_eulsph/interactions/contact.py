@@ -38,7 +38,7 @@ class Contact(Interaction):
     with w half a spacing, r and r_t the distance along the normal n and across it, A the face of a particle, and φ the
     cubic spline of dimension d − 1, h = 1.2 of the larger spacing. n is that of planes through the outermost particles
     around. Pairs are antisymmetric in every bit. Friction is Coulomb's: half cells are sheared elastically until the
-    stress is ``friction`` times the pressure, then they slide. See docs/contact.md.
+    stress is ``friction`` times the pressure, then they slide..
 
     Args:
         between: pairs of names of bodies that touch each other; all with all if None. Bonded bodies are one.
