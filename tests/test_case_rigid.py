@@ -90,7 +90,8 @@ def test_bodies_that_touch_are_one_line():
         assert centre < -1.0  # pushed from above
         assert parse_case(case.describe()).describe() == case.describe()
         jsonschema.validate(json.loads(json.dumps(case.describe())), json_schema())
-    assert case.build().interactions[0] == Contact([("a", "b")], pytest.approx(0.3))
+    (contact,) = case.build().interactions
+    assert contact.between == (("a", "b"),) and contact.friction == pytest.approx(0.3)
     by_kind = parse_case(two(interaction=[{"kind": "Contact"}])).build()
     assert by_kind.interactions == (Contact(),)
     with pytest.raises(CaseError, match=r"contact.0.between: unknown body 'c'"):
