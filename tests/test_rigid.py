@@ -61,7 +61,7 @@ def test_a_bar_leaves_a_wall_as_it_came(options):
 
 
 def test_all_layers_lose_less_than_the_outermost_alone(monkeypatch):
-    """Rebound and the contact's account with the force on outermost particles: .9781, −.0013; on columns .9837, −.0009."""
+    """Rebound and the contact's account with forces on outermost particles: .9781, −.0013; on columns .9837, −.0009."""
     found = []
     for least in (traces.LEAST, np.inf):
         monkeypatch.setattr(traces, "LEAST", least)
