@@ -1,4 +1,4 @@
-"""Sharpened gradients (M21): their order, the waves that they carry, the step that they bear."""
+"""Sharpened gradients (M23): their order, the waves that they carry, the step that they bear."""
 
 import numpy as np
 import pytest

@@ -19,6 +19,7 @@ from .boundaries import (
     Gravity,
     MirrorGhosts,
     Motion,
+    NoSlip,
     Pressure,
     Region,
     Roller,
@@ -27,7 +28,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
-from .interactions import Interaction
+from .interactions import Contact, Interaction, RigidBody
 from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
@@ -81,6 +82,7 @@ __all__ = [
     "Boundary",
     "BrokenError",
     "Clamped",
+    "Contact",
     "Convected",
     "Correction",
     "CubicSpline",
@@ -106,6 +108,7 @@ __all__ = [
     "NeoHookean",
     "NeoHookeanLog",
     "Never",
+    "NoSlip",
     "PairAreas",
     "PaperSensor",
     "Pressure",
@@ -113,6 +116,7 @@ __all__ = [
     "QuinticSpline",
     "ReferencePolicy",
     "Region",
+    "RigidBody",
     "Roller",
     "SaintVenantKirchhoff",
     "Scheme",

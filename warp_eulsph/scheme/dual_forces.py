@@ -74,7 +74,7 @@ def _make_forces(space: Space, tilted: bool) -> wp.Kernel:
 
 
 class DualForces(Stabiliser):
-    """M5 at work, sharpened or not (M21); what dissipates and ties there is in the stress already (M9, M16)."""
+    """M5 at work, sharpened or not (M23); what dissipates and ties there is in the stress already (M9, M16)."""
 
     corrects = False
 

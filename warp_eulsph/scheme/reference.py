@@ -54,7 +54,7 @@ def _make_adopt(space: Space, fixed: bool) -> wp.Kernel:
 # step: without this the punch at 40² fails.
 LOPSIDED = 4.0
 
-# How much higher the highest frequency is with sharpened gradients (M21): 1.17 to 1.21 in squares and cubes, jittered
+# How much higher the highest frequency is with sharpened gradients (M23): 1.17 to 1.21 in squares and cubes, jittered
 # or not (``tests/test_sharpening.py``).
 STEEPER = 1.2
 
@@ -154,7 +154,7 @@ class Configuration:
         corrected: something changes L or the pair vectors after M3 (M10 to M13). Where nothing does and the reference
             is fixed (``plain``), arrays of the same values are one.
         tilt: of the weights (M17), where the reference is plain.
-        sharpened: whether gradients and forces on it are (M21), where it is plain, so that steps are shorter.
+        sharpened: whether gradients and forces on it are (M23), where it is plain, so that steps are shorter.
 
     Attributes:
         fields: struct ``Reference`` of ``fields.py``.

@@ -1,4 +1,4 @@
-"""Sharpened gradients: one step of defect correction on M4, its adjoint on M5, where the arrangement stays (M21)."""
+"""Sharpened gradients: one step of defect correction on M4, its adjoint on M5, where the arrangement stays (M23)."""
 
 import functools
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .reference import Configuration
 
 @dataclass(frozen=True)
 class Sharpening:
-    """∇̃f = ∇f + ⅓ (∇f − S∇f), S∇f_a = Σ_b V_b g_ab (∇f_b ξ) ⊗ L_a ξ, and its exact adjoint in the force (M21).
+    """∇̃f = ∇f + ⅓ (∇f − S∇f), S∇f_a = Σ_b V_b g_ab (∇f_b ξ) ⊗ L_a ξ, and its exact adjoint in the force (M23).
 
     What the corrected gradient misses of a smooth field is of the second order, and M4 sees it itself: of the jumps
     that two particles' gradients leave between them, r_ab = f_b − f_a − ½(∇f_a + ∇f_b)ξ, it takes 3/2 of its own error,
@@ -173,7 +173,7 @@ def _make_gradient(space: Space, simd: bool) -> wp.Kernel:
 
 @functools.cache
 def _make_sharpen(space: Space, simd: bool) -> wp.Kernel:
-    """Kernel: ∇̃f of ∇f in packed rows (M21)."""
+    """Kernel: ∇̃f of ∇f in packed rows (M23)."""
     real, mat, dim = space.real, space.mat, space.dim
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     sum_of = turned_sum(space, simd, dual=False)
@@ -195,7 +195,7 @@ def _make_sharpen(space: Space, simd: bool) -> wp.Kernel:
 
 @functools.cache
 def _make_stress(space: Space, simd: bool) -> wp.Kernel:
-    """Kernel: Π̃ = Q̃ Lᵀ with Q̃ = Q + ⅓ (Q − Σ_b V_b g_ba (Π_b ξ) ⊗ ξ), the adjoint of ∇̃ (M21).
+    """Kernel: Π̃ = Q̃ Lᵀ with Q̃ = Q + ⅓ (Q − Σ_b V_b g_ba (Π_b ξ) ⊗ ξ), the adjoint of ∇̃ (M23).
 
     Into packed rows with ``simd``, into an array without.
     """
@@ -225,7 +225,7 @@ def _make_stress(space: Space, simd: bool) -> wp.Kernel:
 
 
 class Sharpener:
-    """M21 at work on a reference whose arrangement stays.
+    """M23 at work on a reference whose arrangement stays.
 
     Attributes:
         stress_rows: Π̃ in packed rows, after ``stress``; empty without SIMD kernels.

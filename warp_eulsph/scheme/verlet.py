@@ -38,7 +38,7 @@ class Verlet(Scheme):
         tilt: what pair weights are multiplied by near free faces, where the arrangement does not move (M17); None
             leaves coarse bodies soft.
         sharpening: what takes the second-order error out of gradients and forces, where the arrangement does not move
-            (M21); None leaves waves dispersed and coarse bodies softer.
+            (M23); None leaves waves dispersed and coarse bodies softer.
     """
 
     dissipation: Upwind | None = Upwind()

@@ -3,7 +3,7 @@
     python -m warp_eulsph.validation.coarse [--quick] [--output DIR]
 
 Error of the largest rotation (twist) and of the first swing (bend) against the spectral-element solutions, and
-processor time of the twist on one thread, with M4 and M5 as they are, tilted (M17), sharpened (M21) and both, the
+processor time of the twist on one thread, with M4 and M5 as they are, tilted (M17), sharpened (M23) and both, the
 default. Draws error over resolution and over time (``coarse.png``). What they say is in docs/coarse.md.
 """
 
@@ -22,7 +22,7 @@ from .history import History, series
 FORMS = {
     "plain M4, M5": Verlet(tilt=None, sharpening=None),
     "tilted (M17)": Verlet(sharpening=None),
-    "sharpened (M21)": Verlet(tilt=None),
+    "sharpened (M23)": Verlet(tilt=None),
     "both, the default": Verlet(),
 }
 Row = tuple[float, float, float]

@@ -96,7 +96,7 @@ def errors(history: History) -> dict[str, float]:
 #: velocity. The limiter trades error for overshoot, of which a twentieth is left.
 RMS_ERROR, OVERSHOOT, ENERGY_LOSS, LIMITED_OVERSHOOT = 0.14, 0.3, 0.2, 0.05
 
-#: Asked of Verlet with sharpened gradients (M21), without limiter and with it: overshoot of the velocity, energy lost.
+#: Asked of Verlet with sharpened gradients (M23), without limiter and with it: overshoot of the velocity, energy lost.
 SHARP, SHARP_LIMITED = (0.1, 0.1), (0.05, 0.25)
 VERLETS = {
     "verlet": (Verlet(), SHARP),
