@@ -3,7 +3,7 @@
 import logging
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import pairwise, product
 from typing import Any
 
@@ -33,9 +33,16 @@ class Encounters:
         bodies: at the start.
         ghosts: which of all particles are mirror ghosts, (n,) bool, which are no matter.
         box: lengths of the periodic box [m], 0 where it is open.
+        touching: names of two bodies that an interaction keeps apart, which nobody need be told of.
     """
 
-    def __init__(self, bodies: Sequence[Body], ghosts: np.ndarray, box: Sequence[float]):
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        ghosts: np.ndarray,
+        box: Sequence[float],
+        touching: Collection[tuple[str, str]] = (),
+    ):
         self.names = [body.name for body in bodies]
         ends = np.cumsum([0, *(len(body.x) for body in bodies)])
         matter = [np.flatnonzero(~ghosts[first:last]) + first for first, last in pairwise(ends)]
@@ -46,6 +53,9 @@ class Encounters:
         there, group = np.array([len(numbers) > 0 for numbers in matter]), np.array(groups_of(bodies))
         pairs = np.stack(np.triu_indices(len(bodies), 1), axis=1)
         self._left = pairs[(group[pairs[:, 0]] != group[pairs[:, 1]]) & there[pairs].all(axis=1)]
+        for two in touching:
+            felt = np.isin(self._left, [k for k, name in enumerate(self.names) if name in two]).all(axis=1)
+            self._left = self._left[~felt]
         self._looked, self._due, self._rest = 0, 0.0, 0.0  # step, time [s], the clock on the wall [s]
 
     def look(self, x: np.ndarray, t: float, step: int, speed: float = math.inf) -> list[str]:

@@ -33,9 +33,11 @@ class BoundInteraction(ABC):
         indices: numbers of the particles it acts on, (k,) int32.
         recordable: whether all that it does in a step is to launch kernels, so that a graph can repeat it.
         sortable: whether particles may be sorted in memory, as in ``Bound``.
+        touching: names of each two bodies that it keeps apart; of others that meet users are told.
     """
 
     indices: np.ndarray
+    touching: frozenset[tuple[str, str]] = frozenset()
     recordable: bool = False
     sortable: bool = False
 

@@ -2,6 +2,7 @@
 
 from .bar import Bar
 from .base import Law, Material, Variable
+from .fluid import Fluid
 from .hardening import Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
 from .j2 import J2
 from .linear_elastic import LinearElastic
@@ -10,12 +11,16 @@ from .nearly_incompressible import NearlyIncompressible
 from .neo_hookean import NeoHookean
 from .neo_hookean_log import NeoHookeanLog
 from .saint_venant_kirchhoff import SaintVenantKirchhoff
+from .stiffened_gas import IdealGas, StiffenedGas
 from .tait_liquid import TaitLiquid
+from .viscosity import Newtonian, PowerLaw, Viscosity
 
 __all__ = [
     "J2",
     "Bar",
+    "Fluid",
     "Hardening",
+    "IdealGas",
     "JohnsonCook",
     "Law",
     "LinearElastic",
@@ -25,9 +30,13 @@ __all__ = [
     "NearlyIncompressible",
     "NeoHookean",
     "NeoHookeanLog",
+    "Newtonian",
+    "PowerLaw",
     "SaintVenantKirchhoff",
+    "StiffenedGas",
     "Tabulated",
     "TaitLiquid",
     "Variable",
+    "Viscosity",
     "Voce",
 ]

@@ -153,6 +153,24 @@ class ReactionProbe(Probe):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class InteractionProbe(Probe):
+    """Force that interactions exert on a body in the last step: of contact with others, for example.
+
+    Args:
+        body: its name; the first by default.
+    """
+
+    body: str | None = None
+    units: ClassVar[dict[str, str]] = {"force": "N"}
+
+    def bind(self, simulation: RecordedSolids) -> Measure:
+        if not simulation.interactions:
+            raise ValueError(f"probe {self.name!r}: the simulation has no interactions whose forces it could look at")
+        own = simulation.ranges[_body(self, simulation, self.body).name]
+        return lambda: {"force": simulation.interaction_force[own.start : own.stop].sum(axis=0)}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SectionProbe(Probe):
     """Force across a cut of the material: what the part in front of a plane exerts on the part behind it.
 
