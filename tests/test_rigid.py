@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import warp as wp
-from bodies import RUBBER, block
+from bodies import RUBBER, bits, block
 
 import warp_eulsph as es
 from warp_eulsph import execution
@@ -226,11 +226,6 @@ def test_momentum_goes_over_to_the_last_bit(dim, dtype):
     energy = simulation.energy()
     assert abs(energy["interaction"]) < 0.01 * start  # the steps at which points begin to touch
     assert abs(energy["residual"]) < (1e-12 if precise else 1e-5) * start
-
-
-def bits(simulation):
-    listed = {name: array.numpy().tobytes() for name, array in simulation.evolving().items()}
-    return {**listed, **simulation.counters, "energy": simulation.energy()}
 
 
 def test_graphs_sorting_threads_and_host_agree():
