@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .scheme.health import UnstableError, last_good
+from .scheme.health import WELL, UnstableError, last_good
 
 log = logging.getLogger(__name__)
 
@@ -39,6 +39,7 @@ def failure(simulation: Any) -> UnstableError | None:
         what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
         remedy = f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
     else:
+        _look_for_failed(simulation)
         return _look_for_tears(simulation)
     return UnstableError(
         f"unstable at t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
@@ -62,6 +63,21 @@ def _look_for_tears(simulation: Any) -> UnstableError | None:
             log.warning("%s", simulation.tear)
             break
     return None
+
+
+def _look_for_failed(simulation: Any) -> None:
+    """Note the first particle that has failed by its law and log it, once."""
+    if simulation.broken is None:
+        media = [medium for medium in simulation.stepper.media if medium.breaking is not None]
+        places = [(medium.span.start, int(medium.breaking.first.numpy()[0])) for medium in media]
+        found = [start + place for start, place in places if place != WELL]
+        if found:
+            particle = int(simulation.order.ids.numpy()[found[0]])
+            simulation.broken = (
+                f"matter has failed by t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
+                f"{where(simulation, particle, simulation.x)} is among the first"
+            )
+            log.warning("%s", simulation.broken)
 
 
 def _tear(simulation: Any, particle: int) -> UnstableError:

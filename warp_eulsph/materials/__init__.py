@@ -2,6 +2,8 @@
 
 from .bar import Bar
 from .base import Law, Material, Variable
+from .damage import Failure, JohnsonCookFailure, PlasticStrain, PrincipalStrain, PrincipalStress
+from .failing import Failing
 from .hardening import Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
 from .j2 import J2
 from .linear_elastic import LinearElastic
@@ -15,8 +17,11 @@ from .tait_liquid import TaitLiquid
 __all__ = [
     "J2",
     "Bar",
+    "Failing",
+    "Failure",
     "Hardening",
     "JohnsonCook",
+    "JohnsonCookFailure",
     "Law",
     "LinearElastic",
     "LinearHardening",
@@ -25,6 +30,9 @@ __all__ = [
     "NearlyIncompressible",
     "NeoHookean",
     "NeoHookeanLog",
+    "PlasticStrain",
+    "PrincipalStrain",
+    "PrincipalStress",
     "SaintVenantKirchhoff",
     "Tabulated",
     "TaitLiquid",

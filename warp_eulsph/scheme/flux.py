@@ -4,7 +4,6 @@ import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
 import warp as wp
 
 from ..atomics import lower_to, raise_to
@@ -295,7 +294,8 @@ class Flux:
             law = material.law(space)
             history = wp.zeros(count if law.history else 0, dtype=history_row(space, law), device=device)
             if law.history:
-                history.assign(np.broadcast_to(law.start, (count, len(law.start))))
+                spacing = particles.spacing.numpy()[first : first + count]
+                history.assign(law.start_of(spacing))
             self.parts.append(Part(first, count, law, material.filled_constants(law), history))
             first += count
         remembers = any(part.law.history for part in self.parts)

@@ -12,6 +12,7 @@ from ..fields import part, part_of
 from ..space import Space
 from ..structs import ClockArrays, ForceArrays, ParticleArrays, StateArrays
 from .base import Scheme
+from .breaking import Breaking
 from .dissipation import UpwindForces
 from .dual_forces import DualForces
 from .flux import Flux
@@ -73,7 +74,8 @@ class Medium:
 
     Attributes:
         surface_given: the bodies came with their area vectors.
-        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
+        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none. breaking: None where
+            no law fails.
         particles, forces, grad_v: of its own particles, views of what the world has.
     """
 
@@ -104,6 +106,8 @@ class Medium:
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
+        breaks = any(part.law.failed is not None for part in self.flux.parts)
+        self.breaking = Breaking(space, self.flux, self.configuration, device) if breaks else None
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:
             self.limiter = options.limiter.build(space, self.particles, self.configuration, device)
@@ -176,6 +180,8 @@ class Medium:
         """Derive what the evolving arrays determine, after they were overwritten."""
         self.configuration.rebuild()
         self._derive()
+        if self.breaking is not None:
+            self.breaking.rebuild()
 
     def _derive(self) -> None:
         self.configuration.resolve()
@@ -259,12 +265,16 @@ class Medium:
     def update(self, state: StateArrays) -> None:
         """Histories after a full step, and what materials keep of F: liquids J only."""
         self.flux.update(self.of(state).F, self.grad_v, self.configuration, self.clock)
+        if self.breaking is not None:
+            self.breaking.update(self.of(state).F)
 
     def evolving(self) -> dict[str, wp.array]:
         """Every array of its own that a step reads before it writes it, by name."""
         parts = [self.configuration.evolving(), self.flux.evolving(), self.stabiliser.evolving()]
         if self.shifter is not None:
             parts.append(self.shifter.evolving())
+        if self.breaking is not None:
+            parts.append(self.breaking.evolving())
         return {name: array for held in parts for name, array in held.items()}
 
     def _smooth_field(self, f: wp.array, gradient: wp.array, out: wp.array) -> None:
