@@ -16,8 +16,7 @@ from warp_eulsph.output import Probe
 
 
 def test_every_argument_of_the_simulation_is_in_case_files():
-    # There is no interaction in the package, only those of a user's program.
-    arguments = set(inspect.signature(es.Simulation).parameters) - {"interactions"}
+    arguments = set(inspect.signature(es.Simulation).parameters)
     # The plural of a list of tables, and the type as a word.
     renamed = {"bodies": "body", "boundaries": "boundary", "interactions": "interaction", "dtype": "precision"}
     assert {renamed.get(name, name) for name in arguments} <= set(json_schema()["$defs"]["Case"]["properties"])
@@ -28,6 +27,7 @@ def test_all_classes_of_the_package_can_be_named():
     left_out = {cls.__name__ for cls in concrete(es.Boundary)} - {cls.__name__ for cls in writable(es.Boundary)}
     assert left_out == {"MirrorGhosts"}
     assert len(writable(Probe)) == len(concrete(Probe)) >= 4
+    assert writable(es.Interaction) == concrete(es.Interaction)
     for base in (es.Material, es.Weight, es.ReferencePolicy):
         assert writable(base) == concrete(base) and len(concrete(base)) >= 4
     schema = json.dumps(json_schema())

@@ -36,19 +36,20 @@ def cache(tmp_path_factory):
 DAMAGES = (lambda length: length // 2, lambda length: 0, lambda length: 100, lambda length: length - 10)
 
 
-@pytest.mark.parametrize("suffix", [".o", ".meta"])
-def test_what_is_damaged_is_built_anew(cache, suffix):
-    """All damages at once, each in a module of its own, for a start of Python takes its time."""
+def test_what_is_damaged_is_built_anew(cache):
+    """All damages of both kinds of files at once, each in a module of its own, for a start of Python takes its time."""
     folder, energy = cache
-    damaged = sorted(folder.rglob(f"wp__make_*{suffix}"))[::5][: len(DAMAGES)]
+    codes, metas = (sorted(folder.rglob(f"wp__make_*{suffix}")) for suffix in (".o", ".meta"))
+    damaged = [*codes[::5][: len(DAMAGES)], *metas[2::5][: len(DAMAGES)]]
     before = {path: path.read_bytes() for path in damaged}
-    for path, left in zip(damaged, DAMAGES, strict=True):
+    for path, left in zip(damaged, 2 * DAMAGES, strict=True):
         path.write_bytes(path.read_bytes()[: min(left(path.stat().st_size), path.stat().st_size - 10)])
     folders = {path.parent for path in damaged}
+    assert len(folders) == len(damaged)
     others = {path: path.stat().st_mtime_ns for path in folder.rglob("*.o") if path.parent not in folders}
     code, found, said = run(folder)
     assert code == 0 and found == energy, said
-    assert said.count("cannot be loaded") == len(DAMAGES) and said.count("building it anew") == len(DAMAGES)
+    assert said.count("cannot be loaded") == said.count("building it anew") == len(damaged)
     assert all(len(path.read_bytes()) == len(content) for path, content in before.items())
     assert others == {path: path.stat().st_mtime_ns for path in others}  # nobody else's file was touched
     assert "cannot be loaded" not in run(folder)[2]

@@ -33,6 +33,7 @@ def disordered(dim, n, velocity, dtype=wp.float64, F=1.0, reference=es.Always(),
     stepper.U.F.assign(np.broadcast_to(F * np.eye(dim), (len(x), dim, dim)))
     stepper.configuration.refresh(stepper.U)
     stepper.stabiliser.refresh(stepper.configuration, stepper.U)
+    stepper.medium.keep_gradient(stepper.U)
     simulation.clock.aim(1.0)
     return simulation
 

@@ -339,6 +339,7 @@ def test_errors_name_the_particle_by_the_users_number():
     v = simulation.v
     v[300] = np.nan
     simulation.stepper.U.v.assign(simulation.order.by_place(v))
+    simulation.stepper.rebuild()
     with pytest.raises(es.UnstableError) as caught:
         simulation.step()
     bad = np.flatnonzero(~np.isfinite(simulation.v).all(axis=1))

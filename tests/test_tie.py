@@ -98,6 +98,7 @@ def test_books_know_what_the_tie_holds(dim):
     simulation = jittered(dim, n=2 * COUNT[dim] if dim < 3 else 6)
     X = simulation.X
     simulation.stepper.U.v.assign(2.0 * np.sin(9.0 * np.roll(X, 1, axis=1) + 5.0 * X))
+    simulation.stepper.rebuild()
     simulation.stepper.ledger.open(simulation.stepper.U)
     simulation.clock.option = es.TimeStep(cfl=0.1)
     simulation.clock.cfl = 0.1

@@ -27,7 +27,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
-from .interactions import Interaction
+from .interactions import Contact, Interaction
 from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
@@ -80,6 +80,7 @@ __all__ = [
     "Boundary",
     "BrokenError",
     "Clamped",
+    "Contact",
     "Convected",
     "Correction",
     "CubicSpline",

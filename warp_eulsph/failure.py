@@ -1,11 +1,16 @@
 """When a run has failed, and what the user is told: a bad particle, a step that vanished, energy that a step made."""
 
 import logging
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from .body import Body
+from .order import Order
+from .scheme.arrangement import Arrangement
 from .scheme.health import WELL, UnstableError, last_good
+from .scheme.stepper import Stepper
+from .scheme.time_step import DeviceClock
 
 log = logging.getLogger(__name__)
 
@@ -18,7 +23,50 @@ MADE = 0.5
 SETTLING = 100
 
 
-def failure(simulation: Any) -> UnstableError | None:
+class Failing(Protocol):
+    """What is asked of a simulation.
+
+    Attributes:
+        output: who keeps frames, None where nobody does.
+        tear: the first time that a solid came apart.
+        broken: words on the first particle that failed by its law.
+    """
+
+    stepper: Stepper
+    clock: DeviceClock
+    order: Order
+    bodies: list[Body]
+    ranges: dict[str, range]
+    arrangement: Arrangement
+    output: Any
+    tear: UnstableError | None
+    broken: str | None
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions [m], (n, dim)."""
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities [m/s], (n, dim)."""
+
+    @property
+    def F(self) -> np.ndarray:
+        """Deformation gradients, (n, dim, dim)."""
+
+    def history(self, name: str) -> np.ndarray:
+        """What materials remember under this name, by number."""
+
+
+def failure(simulation: Failing) -> UnstableError | None:
     """What is wrong with the present state of a ``Simulation``, None while all is well; reads the device."""
     place, dt = simulation.clock.bad, simulation.clock.free_dt
     remedy = "try a smaller cfl, a finer resolution or a limiter"
@@ -50,7 +98,7 @@ def failure(simulation: Any) -> UnstableError | None:
     )
 
 
-def _look_for_tears(simulation: Any) -> UnstableError | None:
+def _look_for_tears(simulation: Failing) -> UnstableError | None:
     """Note the first tear of a solid and log it, once; it is a failure where the arrangement says so."""
     if simulation.tear is None:
         for particle in _first_torn(simulation):
@@ -59,13 +107,13 @@ def _look_for_tears(simulation: Any) -> UnstableError | None:
                 continue
             simulation.tear = _tear(simulation, particle)
             if getattr(body.arrangement or simulation.arrangement, "stop_when_torn", False):
-                return simulation.tear  # type: ignore[no-any-return]
+                return simulation.tear
             log.warning("%s", simulation.tear)
             break
     return None
 
 
-def _look_for_failed(simulation: Any) -> None:
+def _look_for_failed(simulation: Failing) -> None:
     """Note the first particle that has failed by its law and log it, once."""
     if simulation.broken is None:
         media = [medium for medium in simulation.stepper.media if medium.breaking is not None]
@@ -80,7 +128,7 @@ def _look_for_failed(simulation: Any) -> None:
             log.warning("%s", simulation.broken)
 
 
-def _tear(simulation: Any, particle: int) -> UnstableError:
+def _tear(simulation: Failing, particle: int) -> UnstableError:
     """That a solid has come apart, the first of whose particles with a new face is this one."""
     lost = -simulation.stepper.ledger.accounts()["dissipation"]
     return UnstableError(
@@ -93,7 +141,7 @@ def _tear(simulation: Any, particle: int) -> UnstableError:
     )
 
 
-def _first_torn(simulation: Any) -> list[int]:
+def _first_torn(simulation: Failing) -> list[int]:
     """Number of the first particle with a new face of each medium that has one; reads the device."""
     torn = [(medium, getattr(medium.stabiliser, "torn", None)) for medium in simulation.stepper.media]
     places = [medium.span.start + int(place.numpy()[0]) for medium, place in torn if place is not None]
@@ -101,7 +149,7 @@ def _first_torn(simulation: Any) -> list[int]:
     return [int(ids[place]) for place in places if place < len(ids)]
 
 
-def where(simulation: Any, particle: int, x: np.ndarray) -> str:
+def where(simulation: Failing, particle: int, x: np.ndarray) -> str:
     """Words on a particle's body and place."""
     name = next(name for name, indices in simulation.ranges.items() if particle in indices)
     return place_of(name, x[particle])
@@ -112,11 +160,11 @@ def place_of(body: str, x: np.ndarray) -> str:
     return f"of body {body!r} at x = {np.array2string(x, precision=6)} m"
 
 
-def _history(simulation: Any, particle: int) -> str:
+def _history(simulation: Failing, particle: int) -> str:
     names = {variable.name for _, part in simulation.stepper.remembering for variable in part.law.history}
     return ", ".join(f"{name} = {simulation.history(name)[particle].tolist()}" for name in sorted(names))
 
 
-def _fastest(simulation: Any) -> int:
+def _fastest(simulation: Failing) -> int:
     speeds = [medium.flux.fields.speed.numpy() for medium in simulation.stepper.media]
     return int(simulation.order.by_number(np.concatenate(speeds)).argmax())

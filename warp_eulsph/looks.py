@@ -116,6 +116,16 @@ class Looks:
         return self.order.by_number(sum(part.numpy() for part in parts if len(part)))
 
     @property
+    def interaction_force(self) -> np.ndarray:
+        """Forces of the interactions on the particles in the last step [N], (n, dim): of contact, for example.
+
+        Summed over ``simulation.ranges[name]`` it is what a body takes from others. Zero before the first step, and
+        without interactions.
+        """
+        exchanged = [forces.numpy() for forces in self.stepper.exchanged]
+        return self.order.by_number(sum(exchanged) if exchanged else np.zeros_like(self.stepper.U.x.numpy()))
+
+    @property
     def acceleration(self) -> np.ndarray:
         """Accelerations, ``force`` over mass [m/s²], (n, dim)."""
         return self.force / self.order.by_number(self.particles.mass.numpy())[:, None]

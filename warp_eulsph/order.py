@@ -60,11 +60,11 @@ class Order:
         """Places of particles, (k,) int32 on the device, kept right as long as the array lives."""
         return self._keep(lambda: self.places[numbers], wp.int32)
 
-    def carry(self, given: np.ndarray, dtype: Any) -> wp.array:
+    def carry(self, given: np.ndarray, dtype: type) -> wp.array:
         """Values by number, (n, …), as an array of ``dtype`` by place, kept right as long as it lives."""
         return self._keep(lambda: self.by_place(given), dtype)
 
-    def _keep(self, values: Callable[[], np.ndarray], dtype: Any) -> wp.array:
+    def _keep(self, values: Callable[[], np.ndarray], dtype: type) -> wp.array:
         array = wp.array(values(), dtype=dtype, device=self.device)
         self._kept.append((weakref.ref(array), values))
         return array

@@ -3,7 +3,7 @@
 import logging
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import combinations, pairwise, product
 from typing import Any
 
@@ -33,9 +33,16 @@ class Encounters:
         bodies: at the start.
         ghosts: which of all particles are mirror ghosts, (n,) bool, which are no matter.
         box: lengths of the periodic box [m], 0 where it is open.
+        touching: names of two bodies that an interaction keeps apart, which nobody need be told of.
     """
 
-    def __init__(self, bodies: Sequence[Body], ghosts: np.ndarray, box: Sequence[float]):
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        ghosts: np.ndarray,
+        box: Sequence[float],
+        touching: Collection[tuple[str, str]] = (),
+    ):
         self.names = [body.name for body in bodies]
         ends = np.cumsum([0, *(len(body.x) for body in bodies)])
         matter = [np.flatnonzero(~ghosts[first:last]) + first for first, last in pairwise(ends)]
@@ -45,6 +52,8 @@ class Encounters:
         self._shifts = np.array(list(product(*[(-length, 0.0, length) if length > 0.0 else (0.0,) for length in box])))
         groups, pairs = groups_of(bodies), combinations(range(len(bodies)), 2)
         self._left = [(i, j) for i, j in pairs if groups[i] != groups[j] and len(matter[i]) and len(matter[j])]
+        felt = {frozenset(two) for two in touching}
+        self._left = [(i, j) for i, j in self._left if frozenset((self.names[i], self.names[j])) not in felt]
         self._looked, self._due, self._rest = 0, 0.0, 0.0  # step, time [s], the clock on the wall [s]
 
     def look(self, x: np.ndarray, t: float, step: int, speed: float = math.inf) -> list[str]:

@@ -1,7 +1,7 @@
 """How far a run is: a bar on a terminal or in a notebook."""
 
 import sys
-from typing import Any
+from typing import Any, Protocol
 
 # A run that is over sooner [s] needs no bar.
 DELAY = 1.0
@@ -13,6 +13,24 @@ def watched() -> bool:
     return (stderr is not None and stderr.isatty()) or "ipykernel" in sys.modules
 
 
+class Watched(Protocol):
+    """What is asked of a run; ``watch`` is the bar that shows it."""
+
+    watch: "Bar | None"
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+
+    @property
+    def dt(self) -> float:
+        """Last time step [s]."""
+
+    @property
+    def steps(self) -> int:
+        """Steps taken."""
+
+
 class Bar:
     """Shows time, step and step length of a run; a context, in which it is called after steps.
 
@@ -22,7 +40,7 @@ class Bar:
         show: whether there is a bar; found out if None.
     """
 
-    def __init__(self, simulation: Any, until: float, show: bool | None = None):
+    def __init__(self, simulation: Watched, until: float, show: bool | None = None):
         self.simulation, self.until = simulation, until
         self.show = watched() if show is None else show
         self._delay = DELAY if show is None else 0.0
@@ -43,7 +61,7 @@ class Bar:
         if self._bar is not None:
             self._bar.close()
 
-    def __call__(self, simulation: Any) -> None:
+    def __call__(self, simulation: Watched) -> None:
         """Show where ``simulation`` is now."""
         assert self._bar is not None  # __enter__ gave this object away only with a bar
         self._bar.set_postfix_str(

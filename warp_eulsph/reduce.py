@@ -18,7 +18,7 @@ def _scalar(dtype: type) -> type:
 
 
 @functools.cache
-def _make_partial(dtype: Any) -> wp.Kernel:
+def _make_partial(dtype: type) -> wp.Kernel:
     """Kernel: Σ of each of ``blocks`` equal parts of ``n`` values."""
     zero = _scalar(dtype)(0)
 
@@ -39,7 +39,7 @@ def _make_partial(dtype: Any) -> wp.Kernel:
 class Sum:
     """Σ over values of one Warp type, ``most`` at most, into a one-element array; allocates at construction only."""
 
-    def __init__(self, dtype: Any, most: int, device: wp.DeviceLike):
+    def __init__(self, dtype: type, most: int, device: wp.DeviceLike):
         self.dtype, self._launch = dtype, Launcher(device)
         blocks = min(most // LEAST, MOST_BLOCKS)
         self._scratch = [wp.zeros(size, dtype=dtype, device=device) for size in (blocks, blocks // LEAST)]
@@ -62,7 +62,7 @@ class SumOfParticles:
     side by side.
     """
 
-    def __init__(self, dtype: Any, n: int, device: wp.DeviceLike):
+    def __init__(self, dtype: type, n: int, device: wp.DeviceLike):
         self.n, self.each, self._launch = n, LEAST if wp.get_device(device).is_cpu else 1, Launcher(device)
         self._blocks = wp.zeros(-(-n // self.each), dtype=dtype, device=device)
         self._sum = Sum(dtype, len(self._blocks), device)

@@ -86,6 +86,9 @@ def prelude(space: Space) -> str:
     typedef T Q __attribute__((ext_vector_type(4)));
     typedef T V __attribute__((ext_vector_type(8)));
     constexpr int dim = {space.dim};
+    // has the stack frame aligned, which clang does not by itself: spilled vectors that cross lines cost up to half
+    alignas({ALIGNMENT}) volatile char aligned[{ALIGNMENT}];
+    aligned[0] = 0;
     {_SHUFFLES}
     {image}
     // dim reals, then zeros

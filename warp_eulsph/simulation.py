@@ -103,7 +103,8 @@ class Simulation(Looks):
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order, surface_given)
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
         self.bound_interactions = [interaction.bind(assembly) for interaction in self.interactions]
-        self.encounters = Encounters(self.bodies, self.particles.share.numpy() == 0.0, box)
+        touching = {two for interaction in self.bound_interactions for two in interaction.touching}
+        self.encounters = Encounters(self.bodies, self.particles.share.numpy() == 0.0, box, touching)
         warn(self.bodies, self.encounters, self.space.real)
         self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
         self.stepper = scheme.build(

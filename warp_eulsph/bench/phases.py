@@ -12,7 +12,7 @@ PHASES = {
     "pair sums and correction (M3)": ["configuration.move", "configuration.renew"],
     "balance (M13)": ["stabiliser.refresh"],
     "wave speeds and time step": ["_choose_dt"],
-    "gradient (M4)": ["_velocity_gradient"],
+    "gradient (M4)": ["_velocity_gradient", "_known_gradient", "_mean_gradient"],
     "stress (M1)": ["_stress"],
     "forces (M5, M9)": ["_sum_forces"],
     "updates (M14)": ["_drift", "_kick", "_start_mean", "_finish_mean"],
@@ -38,10 +38,10 @@ class PhaseClock:
                     setattr(owner, name, self._timed(phase, getattr(owner, name)))
 
     def _timed(self, phase: str, method: Any) -> Any:
-        def timed(*arguments: Any) -> Any:
+        def timed(*arguments: Any, **named: Any) -> Any:
             self._inner.append(0.0)
             start = time.process_time()
-            result = method(*arguments)
+            result = method(*arguments, **named)
             spent = time.process_time() - start
             self.seconds[phase] += spent - self._inner.pop()
             if self._inner:

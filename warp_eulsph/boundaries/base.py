@@ -147,11 +147,14 @@ class Bound:
             repeat them.
         sortable: whether particles may be sorted in memory: it finds them by arrays of ``Assembly.order.places_of``,
             what it holds for all of them comes from ``Assembly.order.carry``, the rest goes by ``indices``.
+        steady: whether ``impose`` sets velocities only, by a rule that is the same at all times and places, and linear:
+            of two velocities that obey it the mean does too. Then a step takes one velocity gradient instead of two.
     """
 
     indices: np.ndarray
     recordable: bool = False
     sortable: bool = False
+    steady: bool = False
 
     @property
     def loads(self) -> bool:

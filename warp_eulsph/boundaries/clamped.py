@@ -81,6 +81,7 @@ class BoundClamped(Bound):
 
     recordable = True
     sortable = True
+    steady = True
 
     def __init__(self, condition: Clamped, assembly: Assembly):
         self.condition, self.assembly = condition, assembly

@@ -36,16 +36,10 @@ def find_surface(body: Surface, chosen: np.ndarray, who: str) -> tuple[np.ndarra
         own = skin[chosen[skin]]
         vectors[own], top[own] = body.s[own], own
         return vectors, top
-    faces, pool = [], skin[chosen[skin]]
-    while len(pool):
-        n = _commonest(body, pool, skin)
-        face = None if n is None else _flat_face(body, chosen, n, who)
-        if n is None or face is None or not np.isin(pool, face.tops).any():
-            break
-        faces.append((n, face))
+    faces, pool = flat_faces(body, chosen, who)
+    for n, face in faces:
         vectors[face.members] += face.areas[:, None] * n
         top[face.members] = face.tops[face.columns]
-        pool = np.setdiff1d(pool, face.tops)
     if len(pool):
         which, _ = nearest(body, skin)
         carried = np.flatnonzero((which >= 0) & np.isin(skin[which], pool))
@@ -54,6 +48,23 @@ def find_surface(body: Surface, chosen: np.ndarray, who: str) -> tuple[np.ndarra
     elif len(faces) > 1:
         _warn_of_strips(body, faces, who)
     return vectors, top
+
+
+def flat_faces(body: Surface, chosen: np.ndarray, who: str) -> tuple[list[tuple[np.ndarray, Face]], np.ndarray]:
+    """The flat faces whose outermost particles are among ``chosen``, with their normals, and the particles left over.
+
+    Those left over lie on the surface where it is curved.
+    """
+    faces, pool = [], surface_particles(body)
+    pool = pool[chosen[pool]]
+    while len(pool):
+        n = _commonest(body, pool, surface_particles(body))
+        face = None if n is None else _flat_face(body, chosen, n, who)
+        if n is None or face is None or not np.isin(pool, face.tops).any():
+            break
+        faces.append((n, face))
+        pool = np.setdiff1d(pool, face.tops)
+    return faces, pool
 
 
 def _commonest(body: Surface, pool: np.ndarray, skin: np.ndarray) -> np.ndarray | None:

@@ -47,6 +47,7 @@ class BoundRoller(Bound):
 
     recordable = True
     sortable = True
+    steady = True
 
     def __init__(self, condition: Roller, assembly: Assembly):
         who = type(condition).__name__

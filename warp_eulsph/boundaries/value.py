@@ -50,12 +50,21 @@ class Value:
             ``wp.func`` (x, t) -> row, evaluated on the device; or a Python function (x (k, dim), t) -> any of these
             shapes, evaluated on the host each step (slower: it reads the device).
         who: named in errors.
+        places: rows of the arrays of positions that ``at`` gets, where those are not of all particles.
     """
 
-    def __init__(self, assembly: Assembly, indices: np.ndarray, components: int, given: Any, who: str):
+    def __init__(
+        self,
+        assembly: Assembly,
+        indices: np.ndarray,
+        components: int,
+        given: Any,
+        who: str,
+        places: wp.array | None = None,
+    ):
         self.space, self.device, self.components, self.who = assembly.space, assembly.device, components, who
         self.count, self._launch = len(indices), Launcher(assembly.device)
-        self.places = assembly.order.places_of(indices)
+        self.places = assembly.order.places_of(indices) if places is None else places
         self.rows = wp.zeros(len(indices), dtype=self.space.row(components), device=assembly.device)
         self.function = given if callable(given) else None
         self.on_device = isinstance(given, wp.Function)

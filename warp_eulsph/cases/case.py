@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..building import Options, options_of
-from ..interactions import Interaction
+from ..interactions import Interaction, RigidBody
 from ..materials import Material
 from ..output import DEFAULT_FIELDS, FIELDS, Probe
 from ..scheme.arrangement import Arrangement
@@ -19,7 +19,7 @@ from ..scheme.time_step import TimeStep
 from ..simulation import Body, Simulation
 from ..weights import Weight
 from .expressions import COORDINATES, nearest
-from .options import Table, choice, one_of, open_choice, own_choice
+from .options import Table, choice, one_of, open_choice, table_of
 from .problem import PRECISIONS, OutputTable, Problem
 from .shapes import SHAPES, dimension, particles
 from .values import Formula, Number, PlaceFormula, ZoneFormula
@@ -116,7 +116,10 @@ class Case(Problem):
 
     body: dict[str, BodyTable] = Field(min_length=1, description="bodies by name")
     boundary: list[open_choice(Boundary)] = Field([], description="conditions, imposed in this order")  # type: ignore
-    interaction: list[own_choice(Interaction)] = Field([], description="forces between bodies")  # type: ignore
+    rigid: dict[str, table_of(RigidBody, sole=True, without=("name",))] = Field(  # type: ignore[valid-type]
+        {}, description="rigid bodies by name"
+    )
+    interaction: list[open_choice(Interaction)] = Field([], description="other forces between bodies")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
     scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
@@ -157,10 +160,11 @@ class Case(Problem):
                 ghosts.append(condition)
             bodies.append(body)
         conditions: Sequence[Boundary] = [condition.make(space) for condition in self.boundary]
+        rigid = [RigidBody(**table.arguments(space), name=name) for name, table in self.rigid.items()]
         return Simulation(
             bodies,
             boundaries=[*conditions, *ghosts],
-            interactions=[interaction.make(space) for interaction in self.interaction],
+            interactions=[*rigid, *[interaction.make(space) for interaction in self.interaction]],
             time_step=self.time_step.make(),
             **defaults._asdict(),
             periodic=self.periodic,
@@ -209,6 +213,16 @@ class Case(Problem):
             count = len(self.boundary)
             if hasattr(table, "boundary") and not 0 <= table.boundary < count:
                 wrong.append(f"{path}.boundary: must be one of the {count} conditions, from 0, got {table.boundary}")
+            of = getattr(table, "rigid", None)
+            if of is not None and of not in self.rigid:
+                wrong.append(
+                    f"{path}.rigid: unknown rigid body {of!r}{nearest(of, self.rigid)}; they are {sorted(self.rigid)}"
+                )
+        for path, of in [(f"rigid.{name}", of) for name, table in self.rigid.items() for of in table.bodies or ()]:
+            if of not in self.body:
+                wrong.append(
+                    f"{path}.bodies: unknown body {of!r}{nearest(of, self.body)}; bodies are {sorted(self.body)}"
+                )
         names = [table.name for _, table in probes]
         wrong += [f"probe.{k}.name: is taken by another, got {n!r}" for k, n in enumerate(names) if n in names[:k]]
         if wrong:
@@ -219,5 +233,6 @@ class Case(Problem):
         """Path and value of every formula of place."""
         tables: dict[str, Table] = {f"body.{name}": body for name, body in self.body.items()}
         tables |= {f"boundary.{k}": condition for k, condition in enumerate(self.boundary)} | {"output": self.output}
+        tables |= {f"rigid.{name}.motion": table.motion for name, table in self.rigid.items()}
         pairs = ((f"{path}.{name}", value) for path, table in tables.items() for name, value in table)
         return [(path, value) for path, value in pairs if isinstance(value, Formula)]

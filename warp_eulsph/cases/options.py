@@ -68,10 +68,16 @@ class Options(Table):
     @model_validator(mode="after")
     def _check(self) -> "Options":
         """The class's own checks, which stand beside all others; formulas and conditions come later."""
-        later = any(name == "boundary" or isinstance(value, Formula) for name, value in self)
-        if isinstance(self.target, type) and not later:
+        if isinstance(self.target, type) and not self._later():
             self.make()
         return self
+
+    def _later(self) -> bool:
+        """Whether it has formulas, or conditions, which come later, itself or in a table of it."""
+        return any(
+            name == "boundary" or isinstance(value, Formula) or (isinstance(value, Options) and value._later())
+            for name, value in self
+        )
 
 
 def made(value: Any, space: Any, name: str) -> Any:
@@ -93,10 +99,13 @@ class Nothing(Options):
 
 
 @functools.cache
-def table_of(target: Callable[..., Any], sole: bool = False, kind_name: str | None = None) -> type[Options]:
+def table_of(
+    target: Callable[..., Any], sole: bool = False, kind_name: str | None = None, without: tuple[str, ...] = ()
+) -> type[Options]:
     """The table for a class or function; ``sole`` when nothing else can stand in its place, so that it needs no kind.
 
-    ``kind_name`` is what the kind is if not the target's name.
+    ``kind_name`` is what the kind is if not the target's name; those of its arguments in ``without``, which have
+    defaults, are left out.
 
     Raises:
         TypeError: an argument that cannot be written in TOML.
@@ -106,6 +115,8 @@ def table_of(target: Callable[..., Any], sole: bool = False, kind_name: str | No
     fields: dict[str, Any] = {}
     for parameter in _parameters(target):
         name, default = parameter.name, parameter.default
+        if name in without:
+            continue
         kind = _written(name, hints.get(name, Any))
         if default is inspect.Parameter.empty:
             fields[name] = (kind, Field(description=described.get(name)))
@@ -114,7 +125,8 @@ def table_of(target: Callable[..., Any], sole: bool = False, kind_name: str | No
             fields[name] = (kind, Field(given, validate_default=given is not None, description=described.get(name)))
     kind_name = kind_name or target.__name__
     fields = {"kind": (Literal[kind_name], kind_name if sole else ...), **fields}  # type: ignore[valid-type]
-    model = create_model(target.__name__, __base__=Options, __doc__=_summary(target), **fields)
+    name = f"{target.__name__}Table" if without else target.__name__
+    model = create_model(name, __base__=Options, __doc__=_summary(target), **fields)
     model.target = target if isinstance(target, type) else staticmethod(target)
     return model
 
@@ -174,6 +186,13 @@ def _plain(name: str, hint: Any) -> Any:
         return plain[hint]
     if typing.get_origin(hint) is typing.get_origin(Sequence[int]) and typing.get_args(hint)[0] in plain:
         return list[plain[typing.get_args(hint)[0]]]  # type: ignore[misc]
+    if (
+        typing.get_origin(hint) is typing.get_origin(Sequence[int])
+        and typing.get_origin(typing.get_args(hint)[0]) is tuple
+    ):
+        members = typing.get_args(typing.get_args(hint)[0])
+        if len(set(members)) == 1 and members[0] in plain:
+            return list[Annotated[list[plain[members[0]]], Field(min_length=len(members), max_length=len(members))]]  # type: ignore
     raise TypeError(f"{name}: {hint} cannot be written in a case file")
 
 
@@ -188,12 +207,6 @@ def choice(*bases: type, optional: bool = False) -> Any:
 def open_choice(base: type) -> Any:
     """One of the concrete classes below ``base``, or of the user's own, by ``kind = "module:Class"``."""
     return Annotated[choice(base), _Own(base)]  # type: ignore[arg-type]
-
-
-@functools.cache
-def own_choice(base: type) -> Any:
-    """A class of the user's own below ``base``, of which the package has none."""
-    return Annotated[Options, _Own(base, alone=True)]
 
 
 @functools.cache
@@ -233,15 +246,12 @@ class _Own:
     """Lets a class of the user's own below ``base`` stand there, by its module and name, in files that are trusted."""
 
     base: type
-    alone: bool = False
 
     def _validate(self, given: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
         kind = given.get("kind") if isinstance(given, dict) else given
         if isinstance(given, Options):
             return given
         if not (isinstance(kind, str) and re.fullmatch(OWN_KIND, kind)):
-            if self.alone:
-                raise ValueError(f"kind must name a class below {self.base.__name__} as 'module:Class', got {kind!r}")
             return handler(given)
         table = self._table(kind, reading(info))
         return table.model_validate(given if isinstance(given, dict) else {"kind": kind}, context=info.context)
@@ -274,7 +284,7 @@ class _Own:
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> Any:
         kind = {"type": "string", "pattern": f"^{OWN_KIND}$", "description": f"{self.base.__name__} of your own"}
         table = {"type": "object", "properties": {"kind": kind}, "required": ["kind"]}
-        return {"anyOf": [kind, table] if self.alone else [handler(schema), kind, table]}
+        return {"anyOf": [handler(schema), kind, table]}
 
 
 def concrete(base: type) -> list[type]:

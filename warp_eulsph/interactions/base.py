@@ -33,9 +33,11 @@ class BoundInteraction(ABC):
         indices: numbers of the particles it acts on, (k,) int32.
         recordable: whether all that it does in a step is to launch kernels, so that a graph can repeat it.
         sortable: whether particles may be sorted in memory, as in ``Bound``.
+        touching: names of each two bodies that it keeps apart; of others that meet users are told.
     """
 
     indices: np.ndarray
+    touching: frozenset[tuple[str, str]] = frozenset()
     recordable: bool = False
     sortable: bool = False
 
@@ -72,6 +74,13 @@ class BoundInteraction(ABC):
 
     def energy(self, world: "World") -> float:
         """Energy [J] that it holds at ``world.U``, kinetic energy of its own included; reads the device."""
+        return 0.0
+
+    def supplied(self) -> float:
+        """Energy [J] put in from outside since the start, by a drive or weight of its own; reads the device.
+
+        It is in the account ``external`` of the ledger.
+        """
         return 0.0
 
     def evolving(self) -> dict[str, wp.array]:

@@ -326,7 +326,7 @@ class Skin:
         there: whether it is outermost, (k,) int32.
         area: face of each in the reference [m^(d−1)], (k,).
         half: distance from the particle to the surface, half a spacing [m], (k,).
-        modulus: M = ρ c² of pressure waves at F = I [Pa], (k,).
+        modulus, shear_modulus: ρ c² of pressure and of shear waves at F = I [Pa], (k,).
         normal: unit vector that points out, (k,) of vec, zero where a fragment has none; after ``look``.
         bend: how far the particles around are from a plane, 0 flat to 1 (k,): least over next eigenvalue of their
             second moment; about ¼ in corners. Where it is 1 the normal tells nothing.
@@ -363,10 +363,10 @@ class Skin:
             assembly.order.by_number(values.numpy())[self.indices]
             for values in (world.particles.body, world.particles.spacing)
         )
-        moduli = np.array([M for layer in self._layers for M, _ in layer.medium.flux.moduli()])
+        moduli = np.array([both for layer in self._layers for both in layer.medium.flux.moduli()])[body]
         self.bodies = wp.array(body, dtype=wp.int32, device=device)
         self.half = wp.array(0.5 * spacing, dtype=world.space.real, device=device)
-        self.modulus = wp.array(moduli[body], dtype=world.space.real, device=device)
+        self.modulus, self.shear_modulus = (wp.array(M, dtype=world.space.real, device=device) for M in moduli.T)
         self.there = wp.zeros(k, dtype=wp.int32, device=device)
         self.area, self.bend = (wp.zeros(k, dtype=world.space.real, device=device) for _ in range(2))
         self.normal = wp.zeros(k, dtype=world.space.vec, device=device)

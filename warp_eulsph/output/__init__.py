@@ -3,7 +3,7 @@
 from ..options import explain_mistakes
 from .directory import BusyError, RunDirectory
 from .fields import DEFAULT_FIELDS, FIELDS, TRANSPORT_FIELDS
-from .probes import BodyProbe, PointProbe, Probe, ReactionProbe, SectionProbe
+from .probes import BodyProbe, InteractionProbe, PointProbe, Probe, ReactionProbe, RigidProbe, SectionProbe
 from .reader import Comparison, Run, RunFrame, points_on_line
 from .record import ChangedCaseError, Outcome, record
 from .recording import Recording
@@ -23,11 +23,13 @@ __all__ = [
     "Comparison",
     "DamagedError",
     "Findings",
+    "InteractionProbe",
     "Outcome",
     "PointProbe",
     "Probe",
     "ReactionProbe",
     "Recording",
+    "RigidProbe",
     "Run",
     "RunDirectory",
     "RunFrame",

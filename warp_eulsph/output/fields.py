@@ -46,6 +46,7 @@ SOURCES: dict[str, Callable[[Any], wp.array | np.ndarray]] = {
     "h": lambda simulation: simulation.particles.h,
     "X": lambda simulation: simulation.X,
     "force": lambda simulation: simulation.force,
+    "interaction_force": lambda simulation: simulation.interaction_force,
     "energy_density": lambda simulation: simulation.strain_energy_density,
     "mismatch": lambda simulation: simulation.mismatch,
     "particle": lambda simulation: np.arange(len(simulation.particles.mass), dtype=np.int32),
@@ -109,6 +110,13 @@ FIELDS = {
     ),
     "mismatch": SnapshotField(
         lambda d: (), "-", "how far positions and F disagree, in spacings (M16)", ("mismatch",), default=False
+    ),
+    "interaction_force": SnapshotField(
+        lambda d: (d,),
+        "N",
+        "force of interactions on the particle in the last step, such as of contact; zero before the first",
+        ("interaction_force",),
+        default=False,
     ),
 }
 

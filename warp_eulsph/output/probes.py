@@ -13,6 +13,7 @@ import warp as wp
 from ..boundaries import Boundary
 from ..building import options_of
 from ..diagnostics import BodySums, SectionForce
+from ..interactions import BoundRigidBody
 from ..schedule import EverySteps, Schedule
 from ..scheme.flux import Part
 from .recorded import RecordedSolids
@@ -152,6 +153,24 @@ class ReactionProbe(Probe):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class InteractionProbe(Probe):
+    """Force that interactions exert on a body in the last step: of contact with others, for example.
+
+    Args:
+        body: its name; the first by default.
+    """
+
+    body: str | None = None
+    units: ClassVar[dict[str, str]] = {"force": "N"}
+
+    def bind(self, simulation: RecordedSolids) -> Measure:
+        if not simulation.interactions:
+            raise ValueError(f"probe {self.name!r}: the simulation has no interactions whose forces it could look at")
+        own = simulation.ranges[_body(self, simulation, self.body).name]
+        return lambda: {"force": simulation.interaction_force[own.start : own.stop].sum(axis=0)}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SectionProbe(Probe):
     """Force across a cut of the material: what the part in front of a plane exerts on the part behind it.
 
@@ -186,6 +205,30 @@ class SectionProbe(Probe):
         places = simulation.order.places_of(behind + simulation.ranges[body.name].start)
         force = SectionForce(simulation.space, places)
         return lambda: {"force": force(simulation.stepper.forces)}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RigidProbe(Probe):
+    """Place and velocity of a rigid body, force and torque of the bodies on it in the last step.
+
+    Args:
+        rigid: its name; the first by default.
+    """
+
+    rigid: str | None = None
+    units: ClassVar[dict[str, str]] = {"x": "m", "v": "m/s", "force": "N", "spin": "rad/s", "torque": "N m"}
+
+    def units_in(self, simulation: Any) -> dict[str, str]:
+        return dict(list(self.units.items())[: 3 if simulation.space.dim == 1 else 5])  # nothing turns in 1-D
+
+    def bind(self, simulation: RecordedSolids) -> Measure:
+        bodies = [each for each in simulation.bound_interactions if isinstance(each, BoundRigidBody)]
+        found = next((each for each in bodies if self.rigid in (None, each.option.name)), None)
+        if found is None:
+            names = sorted(each.option.name for each in bodies)
+            raise ValueError(f"probe {self.name!r}: rigid must be one of {names}, got {self.rigid!r}")
+        names = list(self.units_in(simulation))
+        return lambda: {name: getattr(found, name) for name in names}
 
 
 def _body(probe: Probe, simulation: RecordedSolids, name: str | None) -> Any:

@@ -97,6 +97,10 @@ class RecordedSolids(Recorded, Protocol):
     def history(self, name: str) -> np.ndarray:
         """What materials remember under this name, by number, (n,) or (n, 3, 3)."""
 
+    @property
+    def interaction_force(self) -> np.ndarray:
+        """Forces of the interactions on the particles in the last step [N], (n, dim)."""
+
     def momentum(self) -> np.ndarray:
         """[kg m/s], (dim,)."""
 

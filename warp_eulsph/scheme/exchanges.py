@@ -57,10 +57,14 @@ def _make_book_work(entry_type: Any, external: int) -> wp.Kernel:
 
 
 class Exchange(NamedTuple):
-    """An interaction as the ledger sees it: its forces [N] on particles, (n,) of vec, and the energy [J] it holds."""
+    """An interaction as the ledger sees it.
+
+    Its forces [N] on particles, (n,) of vec, the energy [J] it holds, and what came in through it from outside.
+    """
 
     forces: wp.array
     energy: Callable[[], float]
+    supplied: Callable[[], float]
 
 
 class Exchanges:
@@ -102,7 +106,14 @@ class Exchanges:
     def accounts(self) -> list[float]:
         """Energy that each added since the start [J], with what it holds; reads the device.
 
-        0 where its forces are those of its energy and steps are short, less where it dissipates.
+        0 where its forces are those of its energy and steps are short, less where it dissipates. What was supplied
+        through it is not in it.
         """
         booked = zip(self._exchanges, self._works.numpy().tolist(), self._start.numpy().tolist(), strict=True)
-        return [work + float(exchange.energy()) - start for exchange, work, start in booked]
+        return [
+            work + float(exchange.energy()) - start - float(exchange.supplied()) for exchange, work, start in booked
+        ]
+
+    def supplied(self) -> float:
+        """Energy that came in from outside through interactions since the start [J]; reads the device."""
+        return float(sum(exchange.supplied() for exchange in self._exchanges))

@@ -341,7 +341,10 @@ class Ledger:
     def accounts(self) -> dict[str, float]:
         """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
         found = dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
-        return found | ({} if self._exchanges is None else {"interaction": sum(self.exchanged())})
+        if self._exchanges is not None:
+            found["external"] += self._exchanges.supplied()
+            found["interaction"] = sum(self.exchanged())
+        return found
 
     def made(self) -> float:
         """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""

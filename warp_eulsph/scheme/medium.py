@@ -23,7 +23,7 @@ from .reference import Configuration
 from .sensor import SensorField
 from .shifting import Shifter
 from .stabiliser import Stabiliser, Sums
-from .updates import make_drift, make_kick, make_predict
+from .updates import make_drift, make_kick, make_mean, make_predict
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,7 @@ class Medium:
         stabiliser: of its reference. pairs, limiter, shifter: None where the options have none. breaking: None where
             no law fails.
         particles, forces, grad_v: of its own particles, views of what the world has.
+        steady: its steps begin with the ∇_k v that the one before kept.
     """
 
     def __init__(self, space: Space, parts: MediumParts, conditions: Sequence[Bound], device: wp.DeviceLike):
@@ -136,6 +137,10 @@ class Medium:
         epsilon = 0.0 if upwind is None else upwind.epsilon
         d = None if upwind is None or upwind.sensor is None else self.sensors[upwind.sensor].d
         self.sums = Sums(self.configuration, flux, self.grad_v, self.forces, epsilon, d)
+
+    def keep_gradients(self, on: bool) -> None:
+        """Whether each step leaves ∇_k v^{n+1} for the next one."""
+        self.steady, self.kept = on, wp.zeros_like(self.grad_v) if on else self.grad_v
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -201,9 +206,33 @@ class Medium:
 
     # the lines of a step
 
-    def velocity_gradient(self, state: StateArrays) -> None:
-        """∇_k v (M4)."""
-        self.configuration.gradient(self.of(state).v, self.grad_v)
+    def velocity_gradient(self, state: StateArrays, out: wp.array | None = None) -> None:
+        """∇_k v (M4), into ``grad_v`` by default."""
+        self.configuration.gradient(self.of(state).v, self.grad_v if out is None else out)
+
+    def keep_gradient(self, state: StateArrays) -> None:
+        """∇_k v of a state in which a step begins, where it is kept."""
+        if self.steady:
+            self.velocity_gradient(state, self.kept)
+
+    def known_gradient(self, state: StateArrays) -> None:
+        """∇_k v of the state in which a step begins, that which was kept where it was."""
+        if self.steady:
+            wp.copy(self.grad_v, self.kept)
+        else:
+            self.velocity_gradient(state)
+
+    def mean_gradient(self, state: StateArrays, mean: StateArrays) -> None:
+        """∇_k v of ``mean``; as M4 is linear, where all is steady from ∇_k vⁿ and that of ``state``, which is kept."""
+        if self.steady:
+            self.keep_gradient(state)
+            self._launch(make_mean(self.space, "mat"), self.n, [self.kept, self.grad_v])
+        else:
+            self.velocity_gradient(mean)
+
+    def release(self, state: StateArrays) -> None:
+        """The velocity before conditions are imposed."""
+        wp.copy(self.forces.free_v, self.of(state).v)
 
     def gradients(self, state: StateArrays) -> None:
         """∇_k v, and ∇_k F where the smoothing needs it (M4)."""

@@ -103,7 +103,7 @@ def _make_forces(space: Space) -> wp.Kernel:
         const V normal = along * (Z - Z_shear) * (wr / nn), shear = Z_shear * wr;
         #pragma unroll
         for (int j = 0; j < dim; ++j) dissipation[j] += N[j] * normal + J[j] * shear;
-        // apart, so that few vectors are alive at a time: the stack is not aligned to them, spills cost up to a half
+        // apart, so that few vectors are alive at a time and few are spilled
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
             const Q* const B = all + (size_t)b[i] * vectors;

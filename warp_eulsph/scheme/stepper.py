@@ -2,8 +2,6 @@
 
 from abc import ABC, abstractmethod
 
-import warp as wp
-
 from ..structs import StateArrays
 from .base import Scheme
 from .health import check
@@ -43,6 +41,14 @@ class Stepper(World, ABC):
     def _velocity_gradient(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.velocity_gradient(state)
+
+    def _known_gradient(self, state: StateArrays) -> None:
+        for medium in self.media:
+            medium.known_gradient(state)
+
+    def _mean_gradient(self, state: StateArrays, mean: StateArrays) -> None:
+        for medium in self.media:
+            medium.mean_gradient(state, mean)
 
     def _gradients(self, state: StateArrays) -> None:
         for medium in self.media:
@@ -107,8 +113,10 @@ class Stepper(World, ABC):
             medium.limit(state)
         self.ledger.close_limiter(state)
 
-    def _release(self, state: StateArrays) -> None:
-        wp.copy(self.forces.free_v, state.v)
+    def _release(self, state: StateArrays, steady: bool | None = None) -> None:
+        for medium in self.media:
+            if steady in (None, medium.steady):
+                medium.release(state)
 
     def _update(self, state: StateArrays) -> None:
         for medium in self.media:

@@ -56,7 +56,8 @@ def make_turned(space: Space) -> wp.Function:
 
 _CUT = """
         const V off = {off}, pair = ({pair}) * T(0.25);
-        const V share = off > pair ? __builtin_elementwise_sqrt(pair / off) : (V)1;
+        V share = 1;  // of nearly all pairs, which need neither root nor quotient
+        if (__builtin_reduce_or(off > pair)) share = off > pair ? __builtin_elementwise_sqrt(pair / off) : share;
 """
 #: C++ of the same for eight pairs, of −½ ω in S, added to the jumps J.
 TURNING = {

@@ -4,7 +4,7 @@ import functools
 
 import warp as wp
 
-from ..fields import clock_structure, structure
+from ..fields import clock_structure, element, structure
 from ..linalg import cofactor, det
 from ..space import Space
 
@@ -66,6 +66,19 @@ def make_add(space: Space) -> wp.Kernel:
         external[a] = external[a] + forces[a]
 
     return add
+
+
+@functools.cache
+def make_mean(space: Space, kind: str) -> wp.Kernel:
+    """Kernel: f ← ½(f + f_new), elements of this kind (``fields.element``)."""
+    real, of_kind = space.real, element(space, kind)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def mean(first: int, f_new: wp.array(dtype=of_kind), f: wp.array(dtype=of_kind)):
+        a = first + wp.tid()
+        f[a] = (f[a] + f_new[a]) * real(0.5)
+
+    return mean
 
 
 @functools.cache

@@ -1,12 +1,10 @@
 """The two-step scheme with the new velocity in the full step of F: Störmer-Verlet on a movable reference (M14)."""
 
-import functools
 from dataclasses import dataclass
 from typing import ClassVar
 
 import warp as wp
 
-from ..space import Space
 from ..structs import StateArrays
 from .balance import Balance
 from .base import Scheme
@@ -17,6 +15,7 @@ from .stabiliser import Correction
 from .stepper import Stepper
 from .tie import Tie
 from .tilt import Tilt
+from .updates import make_mean
 from .world import Parts
 
 
@@ -53,41 +52,32 @@ class Verlet(Scheme):
         return VerletStepper(self, parts)
 
 
-@functools.cache
-def _make_mean(space: Space) -> wp.Kernel:
-    """Kernel: v ← ½(v + v_new)."""
-    real, vec = space.real, space.vec
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def mean(first: int, v_new: wp.array(dtype=vec), v: wp.array(dtype=vec)):
-        a = first + wp.tid()
-        v[a] = (v[a] + v_new[a]) * real(0.5)
-
-    return mean
-
-
 class VerletStepper(Stepper):
-    """M14 at work."""
+    """M14 at work, by one gradient a step in media whose conditions are steady and by two in others."""
+
+    keeps_gradient = True
 
     def advance(self) -> None:
         """Advance U on the present reference; a table of contents of M14."""
         U, half = self.U, self.half
-        self._velocity_gradient(U)  # M4: ∇_k vⁿ
+        self._known_gradient(U)  # M4: ∇_k vⁿ
         self._choose_dt(U)
         self._sense(U)  # §5: d of vⁿ, and the diffusion of Uⁿ
         self._start_mean(U, half)  # vⁿ into v̄
         self._drift(U, U, 0.5, half)  # M14: F^{n+½}, x^{n+½}
-        self._impose(half, 0.5)
+        self._impose(half, 0.5, steady=False)
         self._stress(half, 0.5)  # M1
         self._sum_forces(half, U, 0.5)  # M5 of F^{n+½}, M9 of vⁿ
         self._kick(U)  # M14: v^{n+1}
+        self._release(U, steady=True)  # the free velocity, for the reactions
+        self._impose(U, 1.0, steady=True)
         self._finish_mean(U, half)  # v̄ = ½(vⁿ + v^{n+1})
-        self._impose(half, 0.5)
-        self._velocity_gradient(half)  # M4: ∇_k v̄
+        self._impose(half, 0.5, steady=False)
+        self._mean_gradient(U, half)  # M4: ∇_k v̄, by ∇_k v^{n+1} for the next step where all is steady
         self._drift(U, half, 1.0, U)  # M14: F^{n+1}, x^{n+1}
         self._limit(U)  # §5: U^{n+1} += d × diffusion
-        self._release(U)  # the free velocity, for the reactions
-        self._impose(U, 1.0)
+        self._release(U, steady=False)
+        self._impose(U, 1.0, steady=False)
         self._update(U)  # histories; liquids keep J only
         self._check(U)
         self.ledger.record(U, half)
@@ -97,4 +87,4 @@ class VerletStepper(Stepper):
         wp.copy(half.v, U.v)
 
     def _finish_mean(self, U: StateArrays, half: StateArrays) -> None:
-        self._launch(_make_mean(self.space), self.n, [U.v, half.v])
+        self._launch(make_mean(self.space, "vec"), self.n, [U.v, half.v])

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import warp as wp
 
@@ -46,6 +47,29 @@ class Parts:
     clock: DeviceClock
 
 
+class _Steady(NamedTuple):
+    """Media in which imposed velocities have the mean of a step in its middle, and the conditions that impose there."""
+
+    media: Sequence[Medium]
+    conditions: Sequence[Bound]
+
+
+def _steady(media: Sequence[Medium], conditions: Sequence[Bound]) -> _Steady:
+    """What is steady: no limiter changes v, and no condition does that is not steady itself and in all of its media."""
+    imposing = [condition for condition in conditions if type(condition).impose is not Bound.impose]
+    where = {id(c): [m for m in media if _acts_on(c, m.span)] for c in imposing}
+    found = [medium for medium in media if medium.limiter is None]
+    for _ in media:  # a condition of two media may make both unsteady, which others share
+        for c in imposing:
+            if not c.steady or any(medium not in found for medium in where[id(c)]):
+                found = [medium for medium in found if medium not in where[id(c)]]
+    return _Steady(found, [c for c in imposing if all(medium in found for medium in where[id(c)])])
+
+
+def _acts_on(condition: Bound, span: range) -> bool:
+    return bool(((condition.indices >= span.start) & (condition.indices < span.stop)).any())
+
+
 class World:
     """Media under conditions. All that bodies have in common is in one set of arrays, of which media have views.
 
@@ -55,6 +79,9 @@ class World:
         interactions: between the media; ``exchanged``: the forces [N] of each, (n,) of vec.
         forces, grad_v: of the last step. clock: time on the device. ledger: where the energy went. steps: taken so far.
     """
+
+    #: Whether steps leave ∇_k v^{n+1} for the next one, in media where conditions are steady and nothing limits v.
+    keeps_gradient: ClassVar[bool] = False
 
     def __init__(self, parts: Parts):
         self.space, self.clock, self.conditions = parts.space, parts.clock, parts.conditions
@@ -67,6 +94,7 @@ class World:
         self.moves_surfaces = not all(medium.policy.fixed for medium in self.media) or any(
             condition.reads_surface for condition in self.conditions
         )
+        self._steady = _steady(self.media, self.conditions) if self.keeps_gradient else _Steady((), ())
         self.limiting = [condition for condition in self.conditions if condition.limits]
         self.exchanged = [wp.zeros(n, dtype=space.vec, device=device) for _ in self.interactions]
         self.half: StateArrays = allocate(space, "State", n, device, empty=() if self.moves_surfaces else ("surface",))
@@ -76,6 +104,7 @@ class World:
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         for medium in self.media:
             medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
+            medium.keep_gradients(medium in self._steady.media)
         self._start([each.surface_given for each in parts.media])
         self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
@@ -111,13 +140,18 @@ class World:
             medium.stabilise(self.U)
         for interaction in self.interactions:
             interaction.start(self)
+        for medium in self.media:
+            medium.keep_gradient(self.U)
 
     def _exchanges(self) -> Exchanges | None:
         """The page of the interactions, where there are any."""
         if not self.interactions:
             return None
         between = zip(self.interactions, self.exchanged, strict=True)
-        listed = [Exchange(forces, functools.partial(interaction.energy, self)) for interaction, forces in between]
+        listed = [
+            Exchange(forces, functools.partial(interaction.energy, self), interaction.supplied)
+            for interaction, forces in between
+        ]
         return Exchanges(self.space, self.particles, self.clock.fields, listed, self.device)
 
     # the references
@@ -149,6 +183,7 @@ class World:
         """Last part of a refresh, launches only, when the lists have room: neighbours, corrections, balance."""
         for k in due:
             self.media[k].renew(self.U)
+            self.media[k].keep_gradient(self.U)
 
     def _shift(self, U: StateArrays, due: Sequence[int] | None = None) -> None:
         shifted = [m for k, m in enumerate(self.media) if m.shifter is not None and (due is None or k in due)]
@@ -159,9 +194,10 @@ class World:
             self.ledger.book_shift(U)
 
     def rebuild(self) -> None:
-        """Derive what the evolving arrays determine, after they were overwritten."""
+        """Derive what the evolving arrays determine, ∇_k v of U too; to be called when they were overwritten."""
         for medium in self.media:
             medium.rebuild()
+            medium.keep_gradient(self.U)
         for interaction in self.interactions:
             interaction.rebuild(self)
 
@@ -221,6 +257,7 @@ class World:
 
     # lines of a step
 
-    def _impose(self, state: StateArrays, fraction: float) -> None:
+    def _impose(self, state: StateArrays, fraction: float, steady: bool | None = None) -> None:
         for condition in self.conditions:
-            condition.impose(state, self.clock.fields, fraction)
+            if steady in (None, condition in self._steady.conditions):
+                condition.impose(state, self.clock.fields, fraction)

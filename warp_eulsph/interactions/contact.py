@@ -1,0 +1,196 @@
+"""Contact of bodies: they push each other where they touch, and do not pass through."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+
+from ..boundaries import Assembly
+from ..boundaries.outermost import pairs
+from ..execution import Launcher
+from ..structs import StateArrays
+from .base import BoundInteraction, Interaction
+from .friction import make_slip
+from .law import make_push, make_rate, skin_structure
+from .nearby import Nearby
+from .skin import Skin
+
+if TYPE_CHECKING:
+    from ..scheme.world import World
+
+# Least distance of particles of two bodies at the start, in spacings: faces that touch have 1, or more.
+APART = 0.9
+
+
+@dataclass(frozen=True)
+class Contact(Interaction):
+    """Bodies that touch: they push each other, do not stick, and rub. There is nothing to tune.
+
+    Outermost particles lie half a spacing beneath the surface. The half cells of two that face each other are matter
+    that the contact presses, so their stiffness is that of the bodies, M = ρ c² of pressure waves::
+
+        p = K ln(r0/r) for r < r0 ,  r0 = w_a + w_b ,  K = r0/(w_a/M_a + w_b/M_b) ,  f_ab = −A_a A_b φ(r_t) p n ,
+
+    with w half a spacing, r and r_t the distance along the normal n and across it, A the face of a particle, and φ the
+    cubic spline of dimension d − 1, h = 1.2 of the larger spacing. n is that of planes through the outermost particles
+    around. Pairs are antisymmetric in every bit. Friction is Coulomb's: half cells are sheared elastically until the
+    stress is ``friction`` times the pressure, then they slide. See docs/contact.md.
+
+    Args:
+        between: pairs of names of bodies that touch each other; all with all if None. Bonded bodies are one.
+        friction: Coulomb's coefficient, 0 without. Pairs that differ in it are a ``Contact`` each.
+
+    Raises:
+        ValueError: when the simulation is built: unknown names, one body, a periodic box, bodies that lie in each other
+            at the start, or one without outermost particles (at least two particles thick).
+    """
+
+    between: Sequence[tuple[str, str]] | None = None
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.friction) and self.friction >= 0.0):
+            raise ValueError(f"Contact: friction must be 0 or more and finite, got {self.friction}")
+        if self.between is not None:
+            named = [tuple(two) if not isinstance(two, str) else (two,) for two in self.between]
+            wrong = [two for two in named if len(two) != 2 or two[0] == two[1]]
+            if wrong or not named:
+                raise ValueError(
+                    'Contact: between must be pairs of names of two bodies such as [("left", "right")], got '
+                    f"{self.between}; None lets all touch all"
+                )
+            object.__setattr__(self, "between", tuple(named))
+
+    def bind(self, assembly: Assembly) -> "BoundContact":
+        return BoundContact(self, assembly)
+
+
+class BoundContact(BoundInteraction):
+    """Contact at work.
+
+    Attributes:
+        rubs: whether there is friction.
+        skin, nearby: from ``start`` on; and slip: elastic slip of the skin's particles [m], (k,) of vec.
+    """
+
+    sortable = True
+
+    def __init__(self, option: Contact, assembly: Assembly):
+        names, self.rubs = list(assembly.bodies), option.friction > 0.0
+        self.option, self.assembly, self.space = option, assembly, assembly.space
+        for name in {name for two in option.between or () for name in two} - set(names):
+            raise ValueError(f"Contact: bodies must be among {sorted(names)}, got {name!r}")
+        if assembly.space.periodic:
+            raise ValueError("Contact: periodic boxes are not for bodies that touch; leave out periodic=...")
+        first = [own.start for own in assembly.bodies.values()]
+        groups = assembly.particles.group.numpy()[first]
+        chosen = option.between or list(combinations(names, 2))
+        numbers = [(names.index(one), names.index(other)) for one, other in chosen]
+        self._felt = np.zeros((len(names), len(names)), dtype=np.int32)
+        for i, j in numbers:
+            self._felt[i, j] = self._felt[j, i] = groups[i] != groups[j]
+        self.touching = frozenset((names[i], names[j]) for i, j in np.argwhere(self._felt).tolist())
+        if not self.touching:
+            raise ValueError(f"Contact: two bodies that are not bonded are needed, got {names}")
+        self._names = [name for k, name in enumerate(names) if self._felt[k].any()]
+        self.indices = np.concatenate([np.arange(own.start, own.stop) for own in self._ranges()]).astype(np.int32)
+        self._launch = Launcher(assembly.device)
+
+    def _ranges(self) -> list[range]:
+        return [self.assembly.bodies[name] for name in self._names]
+
+    def start(self, world: "World") -> None:
+        self._check_apart(world)
+        self.skin = Skin(world, self.assembly, self._names)
+        self.nearby = Nearby(self.skin, self._felt)
+        self._arrays = skin_structure(self.space)()
+        for name in ("places", "there", "area", "half", "modulus", "shear_modulus", "normal", "bend"):
+            setattr(self._arrays, name, getattr(self.skin, name))
+        k, n, device = len(self.skin.indices), world.n, world.device
+        self._energy = wp.zeros(k, dtype=wp.float64, device=device)
+        self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
+        self.slip = wp.zeros(k if self.rubs else 0, dtype=self.space.vec, device=device)
+        self._found_at = wp.zeros(k if self.skin.changes else 0, dtype=self.space.vec, device=device)
+        if self.skin.changes:
+            wp.copy(self._found_at, world.U.x[self.skin.places].contiguous())
+
+    def _check_apart(self, world: "World") -> None:
+        """Raise ValueError where two bodies lie in each other."""
+        by_number, bodies = self.assembly.order.by_number, self.assembly.bodies
+        spacing, share = by_number(world.particles.spacing.numpy()), by_number(world.particles.share.numpy())
+        X = self.assembly.X
+        for one, other in sorted(two for two in self.touching if two[0] < two[1]):
+            own, others = (np.arange(bodies[name].start, bodies[name].stop) for name in (one, other))
+            own, others = own[share[own] > 0.0], others[share[others] > 0.0]
+            reach = APART * max(spacing[own].max(), spacing[others].max())
+            near = [
+                numbers[
+                    ((X[numbers] > X[those].min(axis=0) - reach) & (X[numbers] < X[those].max(axis=0) + reach)).all(1)
+                ]
+                for numbers, those in ((own, others), (others, own))
+            ]
+            i, j = pairs(X[near[0]], X[near[1]], reach)
+            a, b = near[0][i], near[1][j]
+            mean = 0.5 * (spacing[a] + spacing[b])
+            close = np.linalg.norm(X[a] - X[b], axis=1) / mean
+            if (close < APART).any():
+                worst = int(np.argmin(close))
+                raise ValueError(
+                    f"Contact: bodies must not lie in each other at the start, {one!r} and {other!r} do: "
+                    f"{len(np.unique(a[close < APART]))} and {len(np.unique(b[close < APART]))} particles, the nearest "
+                    f"{close[worst]:.3g} spacings apart, at {X[a[worst]]} m; move them apart: faces that touch have "
+                    "their particles one spacing from each other"
+                )
+
+    def rebuild(self, world: "World") -> None:
+        if self.skin.changes:
+            self.skin.find_layers()
+        self.nearby.forget()
+
+    def _find(self, x: wp.array) -> None:
+        """What is outermost now, where the arrangement is read anew and particles have moved."""
+        if self.skin.changes and self.nearby.moved(x, self._found_at):
+            self.skin.find()
+            wp.copy(self._found_at, x[self.skin.places].contiguous())
+            self.nearby.forget()
+
+    def _push(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> bool:
+        """Forces at ``state``, and the energy; whether there can be any."""
+        self.nearby.look(state.x)
+        if self.nearby.pairs:
+            self.skin.look(state)
+            arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.clock.fields, fraction]
+            arguments += [self.option.friction, self.slip, out, self._energy]
+            self._launch(make_push(self.space, self.rubs), len(self.skin.indices), arguments)
+        return self.nearby.pairs > 0
+
+    def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
+        self._push(world, state, fraction, out)
+
+    def rate(self, world: "World") -> None:
+        self._find(world.U.x)
+        self.nearby.look(world.U.x)
+        if self.nearby.pairs:
+            self.skin.look(world.U)
+            U, clock = world.U, world.clock.fields
+            arguments = [self._arrays, self.nearby.rows, U.x, U.v, world.particles, clock]
+            self._launch(make_rate(self.space), len(self.skin.indices), arguments)
+
+    def advance(self, world: "World") -> None:
+        if self.rubs and self.nearby.pairs:  # by normals and places of the last forces
+            half, clock = world.half, world.clock.fields
+            arguments = [self._arrays, self.nearby.rows, half.x, half.v, clock, self.option.friction, self.slip]
+            self._launch(make_slip(self.space), len(self.skin.indices), arguments)
+
+    def energy(self, world: "World") -> float:
+        return float(self._energy.numpy().sum()) if self._push(world, world.U, 0.0, self._nothing) else 0.0
+
+    def evolving(self) -> dict[str, wp.array]:
+        held = {"slip": self.slip} if self.rubs else {}
+        if self.skin.changes:
+            held |= {"found_at": self._found_at, "there": self.skin.there, "area": self.skin.area}
+        return held

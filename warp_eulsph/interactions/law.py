@@ -1,0 +1,236 @@
+"""The law of contact: what two outermost particles of different bodies exert on each other."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..atomics import raise_to
+from ..fields import clock_structure, structure
+from ..space import Space
+from .skin import REACH, surface_weight
+
+# Scatter of a surface around its plane, over its extent, below which it is flat: 3 % of a spacing.
+FLAT = 1.0e-3
+# Part of the sum of half widths below which the pressure goes on along its tangent: it stays finite where bodies were
+# shot into each other.
+PRESSED = 0.25
+# Share of a gap that may close in a step, over the Courant number: that of ``STRAIN`` in ``scheme/flux.py``, for half
+# cells are matter too.
+CLOSING = 0.25
+
+
+@functools.cache
+def skin_structure(space: Space) -> Any:
+    """``wp.struct`` of a skin's arrays, as ``Skin`` has them."""
+
+    @wp.struct
+    class SkinArrays:
+        places: wp.array(dtype=wp.int32)
+        there: wp.array(dtype=wp.int32)
+        area: wp.array(dtype=space.real)
+        half: wp.array(dtype=space.real)
+        modulus: wp.array(dtype=space.real)
+        shear_modulus: wp.array(dtype=space.real)
+        normal: wp.array(dtype=space.vec)
+        bend: wp.array(dtype=space.real)
+
+    return SkinArrays
+
+
+@functools.cache
+def rows_structure() -> Any:
+    """``wp.struct`` of the rows of ``Nearby``."""
+
+    @wp.struct
+    class Rows:
+        start: wp.array(dtype=wp.int32)
+        index: wp.array(dtype=wp.int32)
+
+    return Rows
+
+
+@functools.cache
+def facing(space: Space) -> Any:
+    """``wp.func`` how much two normals face each other: 1 up to 60° from opposite, 0 from 75.5° on."""
+    real, vec = space.real, space.vec
+
+    @wp.func
+    def facing(n: vec, other: vec) -> real:
+        share = wp.clamp(real(-4.0) * wp.dot(n, other) - real(1.0), real(0.0), real(1.0))
+        if wp.length_sq(n) == real(0.0) or wp.length_sq(other) == real(0.0):
+            share = real(1.0)  # fragments face all
+        return share
+
+    return facing
+
+
+@functools.cache
+def pressure(space: Space) -> Any:
+    """``wp.func`` (r, r0) -> row (p, ∫_r^{r0} p dr) over K: p = ln(r0/r), from r0/4 down along its tangent."""
+    real, pair = space.real, space.row(2)
+
+    @wp.func
+    def pressure(r: real, r0: real) -> pair:
+        if r >= r0:
+            return pair(real(0.0), real(0.0))
+        least = real(PRESSED) * r0
+        s = wp.max(r, least)
+        p = wp.log(r0 / s)
+        stored = r0 - s - s * p
+        further = s - r
+        stored += further * (p + real(0.5) * further / least)
+        return pair(p + further / least, stored)
+
+    return pressure
+
+
+@functools.cache
+def meeting(space: Space) -> Any:
+    """``wp.func`` (skin, lower, upper, d) -> normal from lower to upper, row (r, r0, |r_t|, h, share · A_a A_b).
+
+    The normal of the flatter surface counts for more: that of a face, where a corner meets it. (A tilt of a thousandth
+    there is a false gap of a thousandth of a spacing, and a pressure of K/1000.)
+    """
+    real, vec, SkinArrays, row = space.real, space.vec, skin_structure(space), space.row(5)
+    facing_of = facing(space)
+
+    @wp.func
+    def meeting(skin: SkinArrays, lower: int, upper: int, d: vec):
+        along = (skin.bend[upper] * skin.bend[upper] + real(wp.static(FLAT**2))) * skin.normal[lower]
+        along -= (skin.bend[lower] * skin.bend[lower] + real(wp.static(FLAT**2))) * skin.normal[upper]
+        if wp.length_sq(along) == real(0.0):
+            along = d
+        n = wp.normalize(along)
+        r = wp.dot(n, d)
+        r0 = skin.half[lower] + skin.half[upper]
+        h = real(wp.static(2.0 * REACH)) * wp.max(skin.half[lower], skin.half[upper])
+        areas = facing_of(skin.normal[lower], skin.normal[upper]) * skin.area[lower] * skin.area[upper]
+        if r <= -r0:  # behind each other: the far sides of what is thin
+            areas = real(0.0)
+        return n, row(r, r0, wp.length(d - n * r), h, areas)
+
+    return meeting
+
+
+@functools.cache
+def stiffness(space: Space) -> Any:
+    """``wp.func`` (skin, lower, upper) -> row 1/(w_a/M_a + w_b/M_b) of pressure and of shear [Pa/m]; 0 for liquids."""
+    real, SkinArrays, pair = space.real, skin_structure(space), space.row(2)
+
+    @wp.func
+    def stiffness(skin: SkinArrays, lower: int, upper: int) -> pair:
+        normal = real(1.0) / (skin.half[lower] / skin.modulus[lower] + skin.half[upper] / skin.modulus[upper])
+        shear = real(0.0)
+        if skin.shear_modulus[lower] > real(0.0) and skin.shear_modulus[upper] > real(0.0):
+            soft = skin.half[lower] / skin.shear_modulus[lower] + skin.half[upper] / skin.shear_modulus[upper]
+            shear = real(1.0) / soft
+        return pair(normal, shear)
+
+    return stiffness
+
+
+@functools.cache
+def make_push(space: Space, rubs: bool) -> Any:
+    """Kernel: forces of contact of the rows, and half of the energy of each pair; with friction where it ``rubs``.
+
+    A pair is seen from its lower number at both ends, so that both find the same bits. ``slip`` is as in
+    ``friction.py``, and ahead by ``fraction`` Δt.
+    """
+    real, vec, SkinArrays, Rows = space.real, space.vec, skin_structure(space), rows_structure()
+    Clock, meeting_of, stiffness_of, pressure_of = (
+        clock_structure(space),
+        meeting(space),
+        stiffness(space),
+        pressure(space),
+    )
+    weight_of, slope_of = surface_weight(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def push(
+        first: int,
+        skin: SkinArrays,
+        rows: Rows,
+        x: wp.array(dtype=vec),
+        v: wp.array(dtype=vec),
+        clock: Clock,
+        fraction: wp.float64,
+        friction: real,
+        slip: wp.array(dtype=vec),
+        out: wp.array(dtype=vec),
+        energy: wp.array(dtype=wp.float64),
+    ):
+        k = first + wp.tid()
+        force = vec()
+        stored = real(0.0)
+        for i in range(rows.start[k], rows.start[k + 1]):
+            lower = wp.min(k, rows.index[i])
+            upper = wp.max(k, rows.index[i])
+            a, b = skin.places[lower], skin.places[upper]
+            d = x[b] - x[a]
+            n, how = meeting_of(skin, lower, upper, d)
+            if how[4] > real(0.0) and how[0] < how[1]:
+                stiff = stiffness_of(skin, lower, upper)
+                K = stiff[0] * how[1]
+                p = pressure_of(how[0], how[1])
+                beside = d - n * how[0]
+                weight = weight_of(how[2], how[3])
+                pushed = n * (weight * K * p[0]) + beside * (slope_of(how[2], how[3]) * K * p[1])
+                stored += how[4] * weight * K * p[1]
+                if wp.static(rubs):
+                    u = (slip[lower] - slip[upper]) * real(0.5) + (v[b] - v[a]) * real(fraction * clock.dt[0])
+                    u = u - n * wp.dot(n, u)
+                    most = friction * K * p[0]
+                    if stiff[1] * wp.length(u) > most:
+                        u = wp.normalize(u) * (most / stiff[1])
+                    pushed -= u * (weight * stiff[1])
+                    stored += real(0.5) * how[4] * weight * stiff[1] * wp.length_sq(u)
+                if k == lower:
+                    force -= pushed * how[4]
+                else:
+                    force += pushed * how[4]
+        if rows.start[k + 1] > rows.start[k]:
+            out[skin.places[k]] = out[skin.places[k]] + force
+        energy[k] = wp.float64(0.5) * wp.float64(stored)
+
+    return push
+
+
+@functools.cache
+def make_rate(space: Space) -> Any:
+    """Kernel: the frequency of contact, of what is near enough to touch in the step, and the rate at which gaps close.
+
+    The half cells between two particles are a spring of the stiffness A_a A_b φ K/r.
+    """
+    real, vec, SkinArrays, Particles = space.real, space.vec, skin_structure(space), structure(space, "Particles")
+    Rows, Clock, raise_rate = rows_structure(), clock_structure(space), raise_to(space.real)
+    meeting_of, stiffness_of, weight_of = meeting(space), stiffness(space), surface_weight(space)[0]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def rate(
+        first: int,
+        skin: SkinArrays,
+        rows: Rows,
+        x: wp.array(dtype=vec),
+        v: wp.array(dtype=vec),
+        particles: Particles,
+        clock: Clock,
+    ):
+        k = first + wp.tid()
+        a = skin.places[k]
+        square = real(0.0)
+        closing = real(0.0)
+        for i in range(rows.start[k], rows.start[k + 1]):
+            b = skin.places[rows.index[i]]
+            n, how = meeting_of(skin, k, rows.index[i], x[b] - x[a])
+            weight = weight_of(how[2], how[3])
+            if how[4] * weight > real(0.0) and how[0] < real(2.0) * how[1]:
+                gap = wp.max(how[0], real(PRESSED) * how[1])
+                spring = how[4] * weight * stiffness_of(skin, k, rows.index[i])[0] * how[1] / wp.min(gap, how[1])
+                square += spring * (real(1.0) / particles.mass[a] + real(1.0) / particles.mass[b])
+                closing = wp.max(closing, wp.dot(v[a] - v[b], n) / gap)
+        frequency = wp.max(wp.sqrt(square), closing * real(wp.static(2.0 / CLOSING)))
+        if frequency > real(0.0):
+            raise_rate(clock.frequency, frequency)
+
+    return rate

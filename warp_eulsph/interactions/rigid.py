@@ -1,0 +1,235 @@
+"""Rigid bodies that deformable ones touch: obstacles, tools, projectiles."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ..boundaries import Assembly
+from ..execution import Launcher
+from ..reduce import Sum
+from .base import BoundInteraction, Interaction
+from .free import Free
+from .pressing import make_ask, make_gather, make_measure, make_press, make_raise, trace_structure
+from .rigid_motion import Held, RigidMotion, Wrench, make_pose, rotation_matrix, spatial, turning
+from .shapes import Numbers, Shape
+from .traces import Traces, find_traces
+
+if TYPE_CHECKING:
+    from ..scheme.world import World
+
+#: Components of axial vectors by dimension.
+AXIAL = {1: slice(0, 0), 2: slice(2, 3), 3: slice(0, 3)}
+
+
+@dataclass(frozen=True)
+class RigidBody(Interaction):
+    """A rigid body that pushes the bodies that touch it, without friction.
+
+    Nothing is to be tuned: a point of a body's surface (``traces``) that is a depth g inside is pushed out by
+    A M g/spacing, A its area and M = ρ c² the modulus of pressure waves of the body's material at the start: as stiff
+    as one layer of particles. A point is only pushed, never pulled. Rigid bodies do not feel each other.
+
+    Where a body overlaps by less than half a spacing at the start it is taken to touch there, without a force: no face
+    is known better.
+
+    Args:
+        shape: Plane(...), Box(...), Sphere(...), Cylinder(...) or TriangleMesh(...).
+        centre: where the shape's origin lies at the start [m], (dim,); the origin by default.
+        rotation: how the shape is turned at the start, about its origin [rad]: a vector (3,) in 3-D, (1,) in 2-D.
+        motion: Held(), Moving(velocity, spin), Driven(displacement) or Free(mass, ...).
+        bodies: names of those that it touches; all by default.
+        hollow: its matter is what lies outside of the shape: a container.
+        name: for messages, probes and tables.
+
+    Raises:
+        ValueError: when the simulation is built: unknown bodies, a shape or motion that does not fit, particles inside
+            the shape.
+    """
+
+    shape: Shape
+    centre: Sequence[float] | None = None
+    rotation: Sequence[float] | None = None
+    motion: RigidMotion = Held()
+    bodies: Sequence[str] | None = None
+    hollow: bool = False
+    name: str = "rigid"
+
+    def bind(self, assembly: Assembly) -> "BoundRigidBody":
+        if self.hollow and isinstance(self.motion, Free):
+            raise ValueError(f"rigid body {self.name!r}: a hollow one has no mass of its own and cannot be Free(...)")
+        return BoundRigidBody(self, assembly)
+
+
+class BoundRigidBody(BoundInteraction):
+    """A rigid body at work. What it shows is read from the device.
+
+    Attributes:
+        option: its declaration.
+        motion: at work, with its pose.
+    """
+
+    sortable = True
+
+    def __init__(self, option: RigidBody, assembly: Assembly):
+        who = f"rigid body {option.name!r}"
+        self.option, self.assembly, self.space, self.device = option, assembly, assembly.space, assembly.device
+        space, device = assembly.space, assembly.device
+        names = [None] if option.bodies is None else option.bodies
+        self.indices = np.unique(np.concatenate([assembly.select(None, name, who) for name in names]))
+        self._solid = option.shape.solid(space.dim, device)
+        R = rotation_matrix(turning(option.rotation, space.dim, f"{who}: rotation"))
+        centre = spatial(option.centre, space.dim, f"{who}: centre") + R @ self._solid.home
+        pose = make_pose(centre, R @ self._solid.axes, device)
+        self.motion = option.motion.bind(assembly, self._solid, pose)
+        self.recordable = self.motion.recordable
+        self._launch = Launcher(device)
+        numbers = [*self._solid.numbers, *[0.0] * 6][:6]
+        self._shape = [-1.0 if option.hollow else 1.0, Numbers(*numbers), self._solid.triangles]
+        inertia = max(self.motion.inverse_inertia)
+        self._inverse = wp.vec2d(self.motion.inverse_mass, inertia)
+        self._wrench, self._asked = (
+            wp.zeros(1, dtype=Wrench, device=device),
+            wp.zeros(1, dtype=wp.float64, device=device),
+        )
+        self._sum = wp.zeros(1, dtype=wp.float64, device=device)
+
+    def start(self, world: "World") -> None:
+        order, who = self.assembly.order, f"rigid body {self.option.name!r}"
+        moduli = [modulus for medium in world.media for modulus, _ in medium.flux.moduli()]
+        laws = [part.law for _, part in world.remembering]
+        flowing = np.array([law.update is not None and not law.history for law in laws])
+        body = order.by_number(world.particles.body.numpy())
+        self._refuse_overlap(world, who)
+        traces = find_traces(self.assembly, world.U, self.indices, flowing[body], who)
+        mass, spacing = (
+            order.by_number(a.numpy()).astype(float) for a in (world.particles.mass, world.particles.spacing)
+        )
+        stiffness = traces.areas * np.array(moduli)[body[traces.tops]] / spacing[traces.tops]
+        m, row = len(traces.tops), np.repeat(np.arange(len(traces.tops)), np.diff(traces.start))
+        inertia = np.bincount(row, traces.weights**2 / mass[traces.members], minlength=m)
+        self._points = self._fill(traces, stiffness, inertia)
+        self._by_particle(traces, row)
+        device = self.device
+        self._push, self._wrenches = (
+            wp.zeros(m, dtype=wp.vec3d, device=device),
+            wp.zeros(m, dtype=Wrench, device=device),
+        )
+        self._energies, self._frequencies = (wp.zeros(m, dtype=wp.float64, device=device) for _ in range(2))
+        self._add_wrenches, self._add = Sum(Wrench, m, device), Sum(wp.float64, m, device)
+        gaps = self._gaps(world, self._points, m)
+        self._points.half.assign(traces.half + np.minimum(gaps, 0.0))
+
+    def _fill(self, traces: Traces, stiffness: np.ndarray, inertia: np.ndarray) -> Any:
+        points, device = trace_structure(self.space)(), self.device
+        points.start = wp.array(traces.start, dtype=wp.int32, device=device)
+        self._places = points.places = self.assembly.order.places_of(traces.members)
+        points.weights = wp.array(traces.weights, dtype=self.space.real, device=device)
+        points.half, points.stiffness, points.inertia = (
+            wp.array(values, dtype=wp.float64, device=device) for values in (traces.half, stiffness, inertia)
+        )
+        return points
+
+    def _by_particle(self, traces: Traces, row: np.ndarray) -> None:
+        """The rows turned round: of each member the points it is in."""
+        order = np.lexsort((row, traces.members))
+        numbers, counts = np.unique(traces.members, return_counts=True)
+        self._members = self.assembly.order.places_of(numbers.astype(np.int32))
+        integers = [np.concatenate([[0], np.cumsum(counts)]), row[order]]
+        self._gathered = [wp.array(values, dtype=wp.int32, device=self.device) for values in integers]
+        self._gathered.append(wp.array(traces.weights[order], dtype=self.space.real, device=self.device))
+
+    def _gaps(self, world: "World", points: Any, m: int) -> np.ndarray:
+        """Gaps [m] of points at the start, (m,)."""
+        self.motion.look(world.clock.fields, 0.0)
+        out = wp.zeros(m, dtype=wp.float64, device=self.device)
+        kernel = make_measure(self.space, self.option.shape.distance)
+        self._launch(kernel, m, [points, world.U.x, self.motion.at, *self._shape, out])
+        gaps: np.ndarray = out.numpy()
+        return gaps
+
+    def _refuse_overlap(self, world: "World", who: str) -> None:
+        n, none = len(self.indices), np.zeros(len(self.indices))
+        dim = self.space.dim
+        alone = Traces(np.arange(n + 1), self.indices, none + 1.0, none, none, np.zeros((n, dim)), self.indices)
+        gaps = self._gaps(world, self._fill(alone, none, none), n)
+        inside = self.indices[gaps < 0.0]
+        if len(inside):
+            names = [name for name, own in self.assembly.bodies.items() if np.isin(inside, own).any()]
+            worst = self.indices[gaps.argmin()]
+            raise ValueError(
+                f"{who}: bodies must lie outside of it at the start, got {len(inside)} particles of {names} inside, "
+                f"the deepest {-gaps.min():.6g} m at {self.assembly.X[worst]} m; move it, or name the bodies that it "
+                "touches by bodies=[...]"
+            )
+
+    def _press(self, state: Any) -> None:
+        arguments = [self._points, state.x, self.motion.at, *self._shape, self._push, self._wrenches, self._energies]
+        self._launch(make_press(self.space, self.option.shape.distance), len(self._push), arguments)
+
+    def forces(self, world: "World", state: Any, fraction: float, out: wp.array) -> None:
+        self.motion.look(world.clock.fields, fraction)
+        self._press(state)
+        self._add_wrenches(self._wrenches, self._wrench)
+        self._launch(make_gather(self.space), len(self._members), [self._members, *self._gathered, self._push, out])
+
+    def rate(self, world: "World") -> None:
+        clock, U = world.clock.fields, world.U
+        self.motion.look(clock, 0.0)
+        arguments = [self._points, U.x, U.v, self.motion.at, *self._shape, self._inverse, clock, self._asked]
+        kernel = make_ask(self.space, self.option.shape.distance)
+        self._launch(kernel, len(self._push), [*arguments, self._frequencies])
+        self._add(self._frequencies, self._sum)
+        self._launch.once(make_raise(self.space), 1, [self._asked, self._sum, clock])
+
+    def advance(self, world: "World") -> None:
+        self.motion.advance(world.clock.fields, self._wrench)
+
+    def energy(self, world: "World") -> float:
+        self.motion.look(world.clock.fields, 0.0)
+        self._press(world.U)
+        self._add(self._energies, self._sum)
+        return float(self._sum.numpy()[0]) + self.motion.kinetic()
+
+    def supplied(self) -> float:
+        return float(self.motion.work.numpy()[0])
+
+    def evolving(self) -> dict[str, wp.array]:
+        return {**self.motion.evolving(), "wrench": self._wrench}
+
+    @property
+    def x(self) -> np.ndarray:
+        """Where the centre of mass is [m], (dim,)."""
+        return self.motion.pose.x.numpy()[0, : self.space.dim]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocity of the centre of mass [m/s], (dim,)."""
+        return self.motion.pose.v.numpy()[0, : self.space.dim]
+
+    @property
+    def R(self) -> np.ndarray:
+        """Rotation since the shape lay unturned, (3, 3)."""
+        return self.motion.pose.R.numpy()[0] @ self._solid.axes.T
+
+    @property
+    def spin(self) -> np.ndarray:
+        """Angular velocity [rad/s], (3,) in 3-D, (1,) in 2-D, (0,) in 1-D."""
+        return self.motion.pose.spin.numpy()[0, AXIAL[self.space.dim]]
+
+    @property
+    def angular_momentum(self) -> np.ndarray:
+        """About the centre of mass [kg m²/s], as ``spin``; 0 unless it is free."""
+        return self.motion.pose.L.numpy()[0, AXIAL[self.space.dim]]
+
+    @property
+    def force(self) -> np.ndarray:
+        """Force of the bodies on it in the last step [N], (dim,)."""
+        return self._wrench.numpy()[0, : self.space.dim]
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Moment of the bodies on it about its centre of mass in the last step [N m], as ``spin``."""
+        return self._wrench.numpy()[0, 3:][AXIAL[self.space.dim]]
