@@ -158,6 +158,8 @@ def test_pieces_keep_mass_and_momenta_and_a_restored_run_goes_on(simd):
     np.testing.assert_array_equal(simulation.F[cut], before)
     np.testing.assert_allclose(simulation.v[cut], speed, rtol=1e-13)
     np.testing.assert_allclose(simulation.momentum(), momenta[0], atol=1e-11)
+    energy = simulation.energy()
+    assert abs(energy["residual"]) < 1e-12 * energy["total"] and -energy["material"] > 0.03 * energy["total"]
     ahead = simulation.x
     simulation.restore(held, counters)
     simulation.step(20)

@@ -116,8 +116,8 @@ def _look_for_tears(simulation: Failing) -> UnstableError | None:
 def _look_for_failed(simulation: Failing) -> None:
     """Note the first particle that has failed by its law and log it, once."""
     if simulation.broken is None:
-        media = [medium for medium in simulation.stepper.media if medium.breaking is not None]
-        places = [(medium.span.start, int(medium.breaking.first.numpy()[0])) for medium in media]
+        media = [(medium.span.start, medium.breaking) for medium in simulation.stepper.media]
+        places = [(start, int(breaking.first.numpy()[0])) for start, breaking in media if breaking is not None]
         found = [start + place for start, place in places if place != WELL]
         if found:
             particle = int(simulation.order.ids.numpy()[found[0]])

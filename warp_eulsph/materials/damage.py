@@ -46,7 +46,7 @@ class Failure(ABC):
 
 
 @functools.cache
-def _softening(space: Space) -> wp.Function:
+def softening(space: Space) -> wp.Function:
     """``wp.func`` (r, r_max, D, stored, width, energy) -> (r_max, D): stress falls to zero along a line.
 
     r is σ or ε over its strength. Beyond 1 D = r_u/(r_u − 1) (1 − 1/r); ∫ Ψ dD = G/width with r_u = G r²/(width Ψ),
@@ -92,7 +92,7 @@ class PrincipalStress(Failure):
     @functools.cache
     def make_growth(space: Space, law: Law, Constants: type) -> wp.Function:
         real, mat, pair, row = space.real, space.mat, space.row(2), history_row(space, law)
-        bounds, softening = symmetric_bounds(space), _softening(space)
+        bounds, soften = symmetric_bounds(space), softening(space)
 
         @wp.func
         def growth(
@@ -109,7 +109,7 @@ class PrincipalStress(Failure):
             D: real,
             c: Constants,
         ) -> pair:
-            return softening(bounds(sigma)[1] / c.strength, drive, D, stored, width, c.energy)
+            return soften(bounds(sigma)[1] / c.strength, drive, D, stored, width, c.energy)
 
         return growth
 
@@ -139,7 +139,7 @@ class PrincipalStrain(Failure):
     @functools.cache
     def make_growth(space: Space, law: Law, Constants: type) -> wp.Function:
         real, mat, pair, row = space.real, space.mat, space.row(2), history_row(space, law)
-        bounds, softening = symmetric_bounds(space), _softening(space)
+        bounds, soften = symmetric_bounds(space), softening(space)
 
         @wp.func
         def growth(
@@ -157,7 +157,7 @@ class PrincipalStrain(Failure):
             c: Constants,
         ) -> pair:
             largest = real(0.5) * wp.log(bounds(F @ wp.transpose(F))[1])
-            return softening(largest / c.strain, drive, D, stored, width, c.energy)
+            return soften(largest / c.strain, drive, D, stored, width, c.energy)
 
         return growth
 
