@@ -128,6 +128,36 @@ def test_simd_equals_portable_in_a_periodic_box(dim, dtype):
     assert_equal_to_round_off(found[False], found[True], dtype)
 
 
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"scheme": es.Verlet(dissipation=None)},
+        {"scheme": es.Verlet(dissipation=None), "periodic": True},
+        {"scheme": es.Verlet(correction=es.PairAreas()), "surface": 0.0},  # its forces take Π that the tie has changed
+    ],
+    ids=["no dissipation", "periodic", "surface given"],
+)
+def test_a_tie_alone_by_simd_equals_portable(options, dim, dtype):
+    """Where M9 is not, or comes with a correction."""
+    x, volume = cloud(dim, SIDE[dim], jitter=0.15)
+    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=8.0 * np.sin(7.0 * x), surface=options.get("surface"))
+    periodic = (1.0,) * dim if "periodic" in options else None
+    options = {"scheme": options["scheme"], "periodic": periodic, "reference": es.Never(), "dtype": dtype}
+    found, ties = {}, {}
+    for simd in (False, True):
+        execution.set_simd(simd)
+        simulation = es.Simulation(body, time_step=es.TimeStep(fixed=2e-6), **options)
+        found[simd] = results(simulation, 10)
+        ties[simd] = simulation.stepper.forces.tie.numpy().copy()
+    assert_equal_to_round_off(found[False], found[True], dtype)
+    # a tie is what is left of displacements when F has had its share: round-off of these, times the modulus
+    scale = np.abs(found[False]["internal"]).max()
+    assert np.abs(ties[True] - ties[False]).max() <= 1e4 * np.finfo(ties[True].dtype).eps * scale
+    assert not np.array_equal(ties[True], ties[False])  # it is another kernel
+
+
 def test_long_rows_and_far_away_particles_are_found():
     """A row of more than 512 neighbours, and a cloud with a particle so far away that cells must be widened."""
     rng = np.random.default_rng(5)

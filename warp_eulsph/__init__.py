@@ -19,6 +19,7 @@ from .boundaries import (
     Gravity,
     MirrorGhosts,
     Motion,
+    NoSlip,
     Pressure,
     Region,
     Roller,
@@ -27,7 +28,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
-from .interactions import Contact, Interaction
+from .interactions import Contact, Interaction, RigidBody
 from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
@@ -106,6 +107,7 @@ __all__ = [
     "NeoHookean",
     "NeoHookeanLog",
     "Never",
+    "NoSlip",
     "PairAreas",
     "PaperSensor",
     "Pressure",
@@ -113,6 +115,7 @@ __all__ = [
     "QuinticSpline",
     "ReferencePolicy",
     "Region",
+    "RigidBody",
     "Roller",
     "SaintVenantKirchhoff",
     "Scheme",

@@ -149,8 +149,8 @@ def checked_bodies(bodies: list[Body]) -> list[Body]:
         who, before = f"body {body.name!r}", names[:k]
         if body.bonded not in before:
             raise ValueError(f"{who}: bonded must be a body before it, of {before}, got {body.bonded!r}")
-        if body.material.flows or bodies[names.index(body.bonded)].material.flows:
-            raise ValueError(f"{who}: bonded bodies must not flow; join liquids by an interaction")
+        if body.material.flows != bodies[names.index(body.bonded)].material.flows:
+            raise ValueError(f"{who}: a fluid must not be bonded to a solid; join them by an interaction")
     dims = {body.name: body.x.shape[1] for body in bodies}
     if len(set(dims.values())) > 1:
         raise ValueError(f"bodies must have the same dimension, got {dims}")

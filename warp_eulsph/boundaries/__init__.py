@@ -5,7 +5,7 @@ from .body_force import BodyForce
 from .clamped import Clamped
 from .damping import Damping
 from .gravity import Gravity
-from .mirror import Antisymmetry, MirrorGhosts, Wall, mirror
+from .mirror import Antisymmetry, MirrorGhosts, NoSlip, Wall, mirror
 from .motion import Motion
 from .pressure import Pressure
 from .roller import Roller
@@ -24,6 +24,7 @@ __all__ = [
     "Gravity",
     "MirrorGhosts",
     "Motion",
+    "NoSlip",
     "Pressure",
     "Region",
     "Roller",

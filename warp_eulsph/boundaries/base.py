@@ -188,6 +188,9 @@ class Bound:
     def damp(self, state: StateArrays, clock: ClockArrays, forces: ForceArrays) -> None:
         """Add forces [N] that damp motion to both ``forces.external`` and ``forces.damping``; comes after ``load``."""
 
+    def reflect(self, values: wp.array) -> None:
+        """Give ghosts the values of what they copy, (n,) of reals; other conditions have none."""
+
     def limit(self, state: StateArrays, clock: ClockArrays) -> None:
         """Ask for a shorter step, before it is chosen, for what ``load`` may do in it.
 

@@ -40,6 +40,18 @@ class Antisymmetry(Image):
     odd = True
 
 
+@dataclass(frozen=True)
+class NoSlip(Image):
+    """Wall that a viscous fluid sticks to, by which the mean of a particle and its ghost moves: v' = 2 v_w − v.
+
+    Args:
+        velocity: v_w of the wall within its plane [m/s], (dim,); None is a wall at rest.
+    """
+
+    velocity: tuple[float, ...] | None = None
+    odd = False
+
+
 @dataclass(frozen=True, eq=False)
 class MirrorGhosts(Boundary):
     """Overwrites the ghosts that ``mirror`` made; list it after the conditions on its sources.
@@ -50,7 +62,7 @@ class MirrorGhosts(Boundary):
         ghosts: particles of the body that copy them, (k,).
         point: a point of the plane [m], (dim,).
         normal: unit normal of the plane, (dim,).
-        image: Wall() or Antisymmetry().
+        image: Wall(), Antisymmetry() or NoSlip().
     """
 
     body: str
@@ -79,10 +91,11 @@ def mirror(
         point: a point of the plane [m], (dim,).
         normal: normal of the plane, pointing out of the body, (dim,).
         depth: distance from the plane within which particles get a ghost [m].
-        image: Wall(), or Antisymmetry() for a linear law.
+        image: Wall(), NoSlip() for a viscous fluid, or Antisymmetry() for a linear law.
 
     Raises:
-        ValueError: particles on or behind the plane, none within ``depth``, or Antisymmetry without a linear law.
+        ValueError: particles on or behind the plane, none within ``depth``, Antisymmetry without a linear law, a wall
+            that does not move within its plane.
     """
     dim = body.x.shape[1]
     n, p = unit_vector(normal, dim, "mirror"), real_array(point, "mirror: point")
@@ -93,6 +106,10 @@ def mirror(
             "mirror: Antisymmetry needs a linear law such as Bar or LinearElastic, got "
             f"{type(body.material).__name__}; a free surface needs no ghosts otherwise"
         )
+    if isinstance(image, NoSlip) and image.velocity is not None:
+        speed = real_array(image.velocity, "mirror: velocity of the wall")
+        if speed.shape != (dim,) or abs(speed @ n) > 1e-12 * np.linalg.norm(speed):
+            raise ValueError(f"mirror: a wall must move within its plane, ({dim},), got the velocity {image.velocity}")
     distance = (p - body.x) @ n
     spacing = np.broadcast_to(body.spacing, len(body.x))
     if (distance < 0.01 * spacing).any():
@@ -126,7 +143,7 @@ def _fields(body: Any) -> list[tuple[str, np.ndarray]]:
 
 
 @functools.cache
-def _make_reflect(space: Space, odd: bool) -> wp.Kernel:
+def _make_reflect(space: Space, odd: bool, sticks: bool) -> wp.Kernel:
     real, vec, State = space.real, space.vec, structure(space, "State")
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -137,6 +154,7 @@ def _make_reflect(space: Space, odd: bool) -> wp.Kernel:
         X: wp.array(dtype=vec),
         point: vec,
         normal: vec,
+        wall: vec,
         state: State,
     ):
         k = first + wp.tid()
@@ -149,11 +167,29 @@ def _make_reflect(space: Space, odd: bool) -> wp.Kernel:
             state.F[g] = unit - R @ (state.F[a] - unit) @ R
             state.x[g] = X[g] - R @ (state.x[a] - X[a])
         else:
-            state.v[g] = R @ state.v[a]
+            if wp.static(sticks):
+                state.v[g] = wall * real(2.0) - state.v[a]
+            else:
+                state.v[g] = R @ state.v[a]
             state.F[g] = R @ state.F[a] @ R
             state.x[g] = point + R @ (state.x[a] - point)
 
     return reflect
+
+
+@functools.cache
+def _make_copy(space: Space) -> wp.Kernel:
+    @wp.kernel(module="unique", enable_backward=False)
+    def copy(
+        first: int,
+        sources: wp.array(dtype=wp.int32),
+        ghosts: wp.array(dtype=wp.int32),
+        values: wp.array(dtype=space.real),
+    ):
+        k = first + wp.tid()
+        values[ghosts[k]] = values[sources[k]]
+
+    return copy
 
 
 class BoundMirrorGhosts(Bound):
@@ -173,8 +209,14 @@ class BoundMirrorGhosts(Bound):
         share = assembly.particles.share.numpy().copy()
         share[self._ghosts.numpy()] = 0.0
         assembly.particles.share.assign(share)
-        self._plane = [self.space.vec(*condition.point), self.space.vec(*condition.normal)]
+        self._sticks = isinstance(self.image, NoSlip)
+        wall = getattr(self.image, "velocity", None) or (0.0,) * self.space.dim
+        self._plane = [self.space.vec(*given) for given in (condition.point, condition.normal, wall)]
 
     def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         arguments = [self._sources, self._ghosts, self._X, *self._plane, state]
-        self._launch(_make_reflect(self.space, self.image.odd), len(self.indices), arguments)
+        kernel = _make_reflect(self.space, self.image.odd, self._sticks)
+        self._launch(kernel, len(self.indices), arguments)
+
+    def reflect(self, values: wp.array) -> None:
+        self._launch(_make_copy(self.space), len(self.indices), [self._sources, self._ghosts, values])

@@ -10,6 +10,7 @@ import warp as wp
 from ..boundaries import Assembly
 from ..execution import Launcher
 from ..reduce import Sum
+from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .free import Free
 from .pressing import make_ask, make_gather, make_measure, make_press, make_raise, trace_structure
@@ -165,11 +166,11 @@ class BoundRigidBody(BoundInteraction):
                 "touches by bodies=[...]"
             )
 
-    def _press(self, state: Any) -> None:
+    def _press(self, state: StateArrays) -> None:
         arguments = [self._points, state.x, self.motion.at, *self._shape, self._push, self._wrenches, self._energies]
         self._launch(make_press(self.space, self.option.shape.distance), len(self._push), arguments)
 
-    def forces(self, world: "World", state: Any, fraction: float, out: wp.array) -> None:
+    def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
         self.motion.look(world.clock.fields, fraction)
         self._press(state)
         self._add_wrenches(self._wrenches, self._wrench)

@@ -54,6 +54,8 @@ class Law(NamedTuple):
             because its F would grow without bound in shear. Twice must equal once, because a step of length zero
             updates too.
         rebase: see below.
+        viscosity: see below; None has none.
+        heat: see below; None takes none.
         secant: (h, constants) -> share in [0, 1] of the elastic stiffness in shear that stress over total strain still
             is, by which positions are tied to F (M16): all of it where it is None, with h of the start too.
         failed: (h, constants) -> whether the particle has failed for good. The first of a run is logged; where the
@@ -72,6 +74,11 @@ class Law(NamedTuple):
     - rebase: (F, h, constants) -> (F, h) at each refresh, of bodies that it reads anew: a plastic solid starts from
       its elastic F. It must keep det F, stress and energy. None keeps all.
 
+    - viscosity: (F, l, h, constants) -> ρ0 times the largest kinematic viscosity [Pa s], that of pressure waves, for
+      the time step.
+    - heat: (F, h, q, constants) -> h after each full step: heat q [J/m^d] per initial volume that the scheme's
+      dissipation (M9) left in the particle. The stored energy must rise by q.
+
     The moduli are second derivatives of Ψ along F → (I + ε m⊗n) F, n the direction of the wave and m its
     polarisation: ρ0 c² m = Q(n) m with m·Q m = d²Ψ/dε² at ε = 0.
     """
@@ -82,6 +89,8 @@ class Law(NamedTuple):
     wave_moduli: Any
     update: Any = None
     rebase: Any = None
+    viscosity: Any = None
+    heat: Any = None
     secant: Any = None
     failed: Any = None
     history: tuple[Variable, ...] = ()

@@ -71,6 +71,21 @@ def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> wp.Kernel:
     return compute_flux
 
 
+@functools.cache
+def rate_with_viscosity(real: type) -> wp.Function:
+    """``wp.func`` (rate of waves r, of viscosity s) -> what Δt is to be counted by [1/s] (M22).
+
+    Waves of the frequency ω ≤ 2 r and the decay λ ≤ 4 s, of the same operator, are stable in a step that takes the
+    viscous force at its start where (ω Δt)² + 2 λ Δt ≤ 4, by determinant and trace of a step: r² Δt² + 2 s Δt ≤ 1.
+    """
+
+    @wp.func
+    def rate_with_viscosity(r: real, s: real) -> real:
+        return s + wp.sqrt(s * s + r * r)
+
+    return rate_with_viscosity
+
+
 # Largest |∇v| Δt over the Courant number. Single particles can outrun the waves where an arrangement is lost, and would
 # pass through their neighbours in one step: without this the punch at 50² to 90² fails now and then.
 STRAIN = 0.25
@@ -82,8 +97,9 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> wp.Kernel:
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Clock, Constants, dim = clock_structure(space), law.Constants, float(space.dim)
     row, remembers, moduli = history_row(space, law), bool(law.history), long_form(space, law).wave_moduli
+    drag_of, viscous, rate_of = law.viscosity, law.viscosity is not None, velocity_gradient(space, fixed)
     invert, shortening_of = inverse(space), largest_shortening(space)
-    raise_rate, resolution_of = raise_to(real), resolution(space)
+    raise_rate, resolution_of, with_viscosity = raise_to(real), resolution(space), rate_with_viscosity(real)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
@@ -115,11 +131,14 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> wp.Kernel:
         flux.speed[a] = speed
         flux.impedance[a] = rho_k * speed
         flux.shear_impedance[a] = rho_k * shear_speed
-        rate = speed
         if wp.static(fixed):
-            rate *= reference.resolution[a]
+            per_length = reference.resolution[a]
         else:
-            rate *= resolution_of(a, particles, reference)
+            per_length = resolution_of(a, particles, reference)
+        rate = speed * per_length
+        if wp.static(viscous):
+            nu = drag_of(F[a], rate_of(a, F[a], grad_v[a], reference), h, c) * per_density
+            rate = with_viscosity(rate, nu * per_length * per_length)
         # |∇v G⁻¹| ≤ |∇v| |G⁻¹| and, of the bound, |G⁻¹|² ≤ d · shortening: seldom is more than that asked for
         strain_rate = real(STRAIN) * rate
         if wp.ddot(grad_v[a], grad_v[a]) * shortening * real(dim) > strain_rate * strain_rate:

@@ -219,6 +219,9 @@ class Ledger:
     """Energy accounts on the device, booked every step in float64 and read when asked.
 
     What interactions do has an account where there are any: their work on the bodies and what they hold themselves.
+
+    Attributes:
+        v_old: velocities [m/s] at the end of the last step booked, (n,) of vec.
     """
 
     def __init__(
@@ -235,10 +238,10 @@ class Ledger:
         self.space, self.particles, self.clock, self.device = space, particles, clock, device
         self._launch = Launcher(device)
         limited = any(medium.limiter is not None for medium in media)
-        self._v_old = wp.zeros(n, dtype=space.vec, device=device)
+        self.v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
         self._dW_limited = wp.zeros(n if limited else 0, dtype=wp.float64, device=device)
-        self._pages = [_Page(medium, self._v_old, self._W_old, self._W, self._dW_limited) for medium in media]
+        self._pages = [_Page(medium, self.v_old, self._W_old, self._W, self._dW_limited) for medium in media]
         self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
         self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self.start, self._most = 0.0, 0.0
@@ -246,7 +249,7 @@ class Ledger:
 
     def open(self, U: StateArrays) -> None:
         """Start the books at state ``U``."""
-        wp.copy(self._v_old, U.v)
+        wp.copy(self.v_old, U.v)
         for page in self._pages:
             page.medium.flux.energy(page.medium.of(U).F, page.W_old)
         self._total.zero_()
@@ -256,7 +259,7 @@ class Ledger:
 
     def evolving(self) -> dict[str, wp.array]:
         """The accounts and the end of the last step booked, by name; with ``start`` what a checkpoint must hold."""
-        held = {"Ledger.total": self._total, "Ledger.v_old": self._v_old, "Ledger.W_old": self._W_old}
+        held = {"Ledger.total": self._total, "Ledger.v_old": self.v_old, "Ledger.W_old": self._W_old}
         return held if self._exchanges is None else held | self._exchanges.evolving()
 
     def open_limiter(self, U: StateArrays) -> None:
@@ -279,7 +282,7 @@ class Ledger:
         ``smoothed`` is S(v) − v [m/s] of a scheme whose full step smooths, (particles of the medium,) of vec for each.
         """
         if self._exchanges is not None:
-            self._exchanges.record(U, self._v_old, self._total, ACCOUNTS.index("external"))
+            self._exchanges.record(U, self.v_old, self._total, ACCOUNTS.index("external"))
         for k, page in enumerate(self._pages):
             medium, limiter = page.medium, page.medium.limiter
             flux = medium.flux

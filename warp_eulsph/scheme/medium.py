@@ -16,6 +16,7 @@ from .breaking import Breaking
 from .dissipation import UpwindForces
 from .dual_forces import DualForces
 from .flux import Flux
+from .heating import Heating
 from .limiter import MassDiffusion
 from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
@@ -74,8 +75,8 @@ class Medium:
 
     Attributes:
         surface_given: the bodies came with their area vectors.
-        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none. breaking: None where
-            no law fails.
+        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
+        breaking, heating: None where no law fails, none takes heat.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
     """
@@ -103,7 +104,8 @@ class Medium:
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
-            simd, upwind = self.configuration.pairs_by_simd(sensed), options.dissipation if plain else None
+            upwind = options.dissipation if plain else None
+            simd = self.configuration.pairs_by_simd(sensed and plain)
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
@@ -115,6 +117,7 @@ class Medium:
         users = [option for option in (options.dissipation, options.limiter) if option is not None]
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
+        self.heating: Heating | None = None
         self.smoothed_F_k = self.configuration.fields.F
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
@@ -141,6 +144,16 @@ class Medium:
     def keep_gradients(self, on: bool) -> None:
         """Whether each step leaves ∇_k v^{n+1} for the next one."""
         self.steady, self.kept = on, wp.zeros_like(self.grad_v) if on else self.grad_v
+
+    @property
+    def heats(self) -> bool:
+        """Whether its dissipation heats a law of its bodies."""
+        return self.options.dissipation is not None and any(part.law.heat is not None for part in self.flux.parts)
+
+    def take_heat(self, heat: wp.array, v_old: wp.array) -> None:
+        """See the own particles of the world's heat [J] and of the velocities [m/s] before the step."""
+        own = part_of(heat, self.span), part_of(v_old, self.span)
+        self.heating = Heating(self.space, self.flux, self.particles, *own, self.device)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -259,6 +272,8 @@ class Medium:
     def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
         at, v = self.of(state), self.of(rates).v
+        if self.heating is not None:
+            self.heating.note(at.x, v, self.grad_v)
         if self.pairs is not None:
             self.pairs.compute(self.sums, at, v)
         self.stabiliser.compute(self.sums, at.x, v)
@@ -296,6 +311,16 @@ class Medium:
         self.flux.update(self.of(state).F, self.grad_v, self.configuration, self.clock)
         if self.breaking is not None:
             self.breaking.update(self.of(state).F)
+
+    def find_heat(self, state: StateArrays) -> None:
+        """What M9 took in the step that ended in ``state``, particle by particle."""
+        if self.heating is not None:
+            self.heating.find(self.sums, self.of(state).v, self.clock)
+
+    def heat(self, state: StateArrays) -> None:
+        """That heat into the laws."""
+        if self.heating is not None:
+            self.heating.take(self.of(state).F, self.clock)
 
     def evolving(self) -> dict[str, wp.array]:
         """Every array of its own that a step reads before it writes it, by name."""

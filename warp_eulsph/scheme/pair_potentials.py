@@ -19,17 +19,18 @@ from .tie import Tie
 from .turning import TURNING, make_spin, make_turned
 
 
-def _vectors(space: Space) -> int:
-    """Rows of four: X, u, v with impedance, √secant, shear impedance; columns of −½(F − I), −½∇v (F⁻¹); −½ spin."""
-    return 4 + 2 * space.dim
+def _vectors(space: Space, damped: bool) -> int:
+    """Rows of four: X with impedance, u with √secant, columns of −½(F − I); for M9 v with shear impedance, −½∇v (F⁻¹),
+    −½ spin."""
+    return 4 + 2 * space.dim if damped else 2 + space.dim
 
 
 @functools.cache
-def _make_pack(space: Space, stressed: bool) -> wp.Kernel:
+def _make_pack(space: Space, damped: bool, stressed: bool) -> wp.Kernel:
     """Kernel: what the SIMD pass reads of a neighbour, side by side; ∇v F⁻¹ where M9 has a stress, else ∇v."""
     real, vec, mat, dim, invert = space.real, space.vec, space.mat, space.dim, inverse(space)
     Reference, Flux, spin_of = structure(space, "Reference"), structure(space, "Flux"), make_spin(space)
-    first_H, first_grad, first_spin = 12, 12 + 4 * dim, 12 + 8 * dim
+    first_H, first_v, first_grad, first_spin = 8, 8 + 4 * dim, 12 + 4 * dim, 12 + 8 * dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def pack(
@@ -43,38 +44,38 @@ def _make_pack(space: Space, stressed: bool) -> wp.Kernel:
         rows: wp.array2d(dtype=real),
     ):
         a = first + wp.tid()
-        X_a, v_a, grad_a = reference.x[a], v[a], mat(grad_v[a])
-        spatial = grad_a @ invert(F[a])
-        if wp.static(stressed):
-            grad_a = spatial
-        omega = spin_of(spatial)
-        for i in range(3):
-            rows[a, first_spin + i] = omega[i] * real(-0.5)
-        rows[a, first_spin + 3] = real(0.0)
+        X_a = reference.x[a]
         u_a, H_a = x[a] - X_a, F[a] - wp.identity(n=wp.static(dim), dtype=real)
         rows[a, 3] = flux.impedance[a]
         rows[a, 7] = flux.secant[a]
-        rows[a, 11] = flux.shear_impedance[a]
-        for j in range(wp.static(dim)):
-            rows[a, first_H + 4 * j + 3] = real(0.0)
-            rows[a, first_grad + 4 * j + 3] = real(0.0)
         for i in range(wp.static(dim)):
             rows[a, i] = X_a[i]
             rows[a, 4 + i] = u_a[i]
-            rows[a, 8 + i] = v_a[i]
+            rows[a, first_H + 4 * i + 3] = real(0.0)
             for j in range(wp.static(dim)):
                 rows[a, first_H + 4 * j + i] = H_a[i, j] * real(-0.5)
-                rows[a, first_grad + 4 * j + i] = grad_a[i, j] * real(-0.5)
+        if wp.static(damped):
+            v_a, grad_a = v[a], mat(grad_v[a])
+            spatial = grad_a @ invert(F[a])
+            if wp.static(stressed):
+                grad_a = spatial
+            omega = spin_of(spatial)
+            for i in range(3):
+                rows[a, first_spin + i] = omega[i] * real(-0.5)
+            rows[a, first_spin + 3] = real(0.0)
+            rows[a, first_v + 3] = flux.shear_impedance[a]
+            for i in range(wp.static(dim)):
+                rows[a, first_v + i] = v_a[i]
+                rows[a, first_grad + 4 * i + 3] = real(0.0)
+                for j in range(wp.static(dim)):
+                    rows[a, first_grad + 4 * j + i] = grad_a[i, j] * real(-0.5)
 
     return pack
 
 
 @functools.cache
-def _make_simd(space: Space, stressed: bool, yielding: bool) -> wp.Kernel:
-    """Kernel of the pass from packed rows, without a sensor; M9 has a stress where ``stressed``.
-
-    What a tie that yields holds is kept where ``yielding``.
-    """
+def _make_simd(space: Space, damped: bool, stressed: bool, dual: bool, yielding: bool) -> wp.Kernel:
+    """Kernel of the pass from packed rows: as the portable one, but for M9 with a sensor."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
@@ -83,17 +84,19 @@ def _make_simd(space: Space, stressed: bool, yielding: bool) -> wp.Kernel:
     turning = "" if stressed or space.dim == 1 else TURNING[space.dim]
     snippet = f"""
     {prelude(space)}
-    constexpr int vectors = {_vectors(space)};
+    constexpr int vectors = {_vectors(space, damped)}, of_v = 2 + dim;
+    constexpr bool damped = {int(damped)}, stressed = {int(stressed)}, yielding = {int(yielding)};
     const Q* const all = (const Q*)rows.data;
     {OWN_ROW}
     // impedances are added where the rest is subtracted, secants are as they are
-    const V X_a = mine(0, -1), u_a = mine(1, 0), v_a = mine(2, -1);
-    const V spin_a = mine(3 + 2 * dim, 1);
+    const V X_a = mine(0, -1), u_a = mine(1, 0);
+    V v_a = 0, spin_a = 0;
+    if (damped) v_a = mine(of_v, -1), spin_a = mine(of_v + 1 + dim, 1);
     V H_a[dim], grad_a[dim], tie[dim], drag[dim], tied[dim * dim], dragged[dim * dim], held = 0;
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
-        H_a[j] = mine(3 + j, 1);
-        grad_a[j] = mine(3 + dim + j, 1);
+        H_a[j] = mine(2 + j, 1);
+        if (damped) grad_a[j] = mine(of_v + 1 + j, 1);
         tie[j] = drag[j] = 0;
     }}
     #pragma unroll
@@ -107,43 +110,50 @@ def _make_simd(space: Space, stressed: bool, yielding: bool) -> wp.Kernel:
             xi[i] = nearest(both(B[0], C[0]) - X_a);
             apart[i] = both(B[1], C[1]) - u_a;
             now[i] = xi[i] + apart[i];
-            jump[i] = both(B[2], C[2]) - v_a;
-            spin[i] = both(B[3 + 2 * dim], C[3 + 2 * dim]) + spin_a;
             #pragma unroll
-            for (int j = 0; j < dim; ++j) {{
-                apart[i] += (H_a[j] + both(B[3 + j], C[3 + j])) * spread(xi[i], j);
-                jump[i] += (grad_a[j] + both(B[3 + dim + j], C[3 + dim + j])) * spread({between}[i], j);
-            }}
+            for (int j = 0; j < dim; ++j) apart[i] += (H_a[j] + both(B[2 + j], C[2 + j])) * spread(xi[i], j);
+            if (!damped) continue;
+            jump[i] = both(B[of_v], C[of_v]) - v_a;
+            spin[i] = both(B[of_v + 1 + dim], C[of_v + 1 + dim]) + spin_a;
+            #pragma unroll
+            for (int j = 0; j < dim; ++j)
+                jump[i] += (grad_a[j] + both(B[of_v + 1 + j], C[of_v + 1 + j])) * spread({between}[i], j);
         }}
         turn(xi, X);
+        turn(apart, R);
+        const V stiffness = w * R[3] * modulus;
+        #pragma unroll
+        for (int i = 0; i < dim; ++i) {{
+            const V pull = R[i] * stiffness;
+            tie[i] += pull;
+            if (yielding) held += pull * R[i];
+            #pragma unroll
+            for (int j = 0; j < dim; ++j) tied[i * dim + j] += pull * X[j];
+        }}
+        if (!damped) return;
         turn(now, N);
         turn(jump, J);
-        turn(apart, R);
         turn(spin, S);
         {turning}
         {SQUARES}
-        const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon), stiffness = w * R[3] * modulus;
+        const V area = w * __builtin_elementwise_sqrt(rr) * (T(0.25) * epsilon);
         const V Z = X[3], Z_shear = J[3], normal = along * (Z - Z_shear) * (area / nn), shear = Z_shear * area;
         #pragma unroll
         for (int i = 0; i < dim; ++i) {{
-            const V pull = R[i] * stiffness, push = N[i] * normal + J[i] * shear;
-            tie[i] += pull;
-            if ({int(yielding)}) held += pull * R[i];
+            const V push = N[i] * normal + J[i] * shear;
             drag[i] += push;
-            #pragma unroll
-            for (int j = 0; j < dim; ++j) tied[i * dim + j] += pull * X[j];
-            if ({int(stressed)}) for (int j = 0; j < dim; ++j) dragged[i * dim + j] += push * N[j];
+            if (stressed) for (int j = 0; j < dim; ++j) dragged[i * dim + j] += push * N[j];
         }}
     }};
     {BY_EIGHT_LARGER}
-    if ({int(yielding)}) helds.data[a] = total(held) * (V_a * T(0.5));
+    if (yielding) helds.data[a] = total(held) * (V_a * T(0.5));
     #pragma unroll
     for (int i = 0; i < dim; ++i) {{
         ties.data[a].c[i] = total(tie[i]) * (V_a * secant);
-        drags.data[a].c[i] = total(drag[i]) * V_a;
+        if (damped) drags.data[a].c[i] = total(drag[i]) * V_a;
         #pragma unroll
         for (int j = 0; j < dim; ++j) tie_stress.data[a].data[i][j] = total(tied[i * dim + j]) * (T(-0.5) * secant);
-        if ({int(stressed)})
+        if (stressed)
             for (int j = 0; j < dim; ++j) drag_stress.data[a].data[i][j] = total(dragged[i * dim + j]) * T(-0.5);
     }}
     """
@@ -208,6 +218,8 @@ def _make_simd(space: Space, stressed: bool, yielding: bool) -> wp.Kernel:
         if wp.static(stressed):
             flux.drag[a] = flux.drag[a] @ wp.transpose(invert(F[a]))
             flux.Q[a] = flux.Q[a] + flux.drag[a]
+        if wp.static(dual):
+            flux.Pi[a] = flux.Q[a] @ wp.transpose(reference.L[a])
 
     return pair_potentials_simd
 
@@ -281,7 +293,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
                     jump -= turned(spin_of(D[a] + D[b]) * real(0.5), off, wp.length(xi) * real(0.5))
                 jump = jump * epsilon
                 if wp.static(sensed):
-                    jump = mix(jump, plain, real(1.0), sensor[a], sensor[b])
+                    jump = mix(jump, plain * epsilon, real(1.0), sensor[a], sensor[b])
                 Z = flux.impedance[a] + flux.impedance[b]
                 Z_shear = flux.shear_impedance[a] + flux.shear_impedance[b]
                 push = pair_force(xi, now, w, Z, Z_shear, jump)
@@ -315,7 +327,7 @@ class PairPotentials:
     Args:
         tie: None ties nothing.
         dissipation: M9; None where a correction changes M5 (M10 to M12), with which M9 comes then.
-        simd: whether the pass runs by SIMD kernels, which know of no sensor.
+        simd: whether the pass runs by SIMD kernels, whose M9 knows of no sensor.
         groups: number of each body, equal for those that are bonded: they have the modulus of the softest, so that
             pairs across the joint find the same at both ends.
     """
@@ -332,14 +344,14 @@ class PairPotentials:
     ):
         self.space, self._launch = space, Launcher(device)
         damped = dissipation is not None
-        self._damped, self._simd = damped, simd and damped
+        self._damped, self._simd = damped, simd
         self._stressed = dissipation is not None and dissipation.stress
         n = len(flux.fields.Q)
         moduli = [tie.modulus(M, mu, space.dim) if tie is not None else 0.0 for M, mu in flux.moduli()]
         softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
         self._bodies = list(zip(flux.bodies, softest, strict=True))
-        self._rows = packed_rows(space, n if self._simd else 0, _vectors(space), device)
-        self._D = wp.zeros(n if damped and not self._simd else 0, dtype=space.mat, device=device)
+        self._rows = packed_rows(space, n if simd else 0, _vectors(space, damped), device)
+        self._D = wp.zeros(n if damped and not simd else 0, dtype=space.mat, device=device)
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
         self._one = wp.ones(1, dtype=space.real, device=device)
         flux.fields.secant = repeated(self._one, n)
@@ -354,27 +366,19 @@ class PairPotentials:
         """Forces [N] at x and F of ``state`` and velocities ``v``, and their stresses, which are added to Q."""
         reference, near, flux = sums.configuration.fields, sums.configuration.near, sums.flux
         grad_v, epsilon, forces = sums.grad_v, sums.epsilon, sums.forces
+        damped, stressed, dual = self._damped, self._stressed, len(flux.Pi) > 0
         if self._simd:
             arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
-            self._launch(_make_pack(self.space, self._stressed), len(v), arguments)
-            kernel = _make_simd(self.space, self._stressed, self._yielding)
+            self._launch(_make_pack(self.space, damped, stressed), len(v), arguments)
+            kernel = _make_simd(self.space, damped, stressed, dual, self._yielding)
             for body, modulus in self._bodies:
                 arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
                 self._launch(kernel, len(body), arguments, body.start)
             return
-        if self._damped:
+        if damped:
             self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
-        sensed, dual = sums.sensor is not None, len(flux.Pi) > 0
-        kernel = _make_portable(self.space, self._damped, self._stressed, sensed, dual, self._yielding)
+        kernel = _make_portable(self.space, damped, stressed, sums.sensor is not None, dual, self._yielding)
+        sensor = v if sums.sensor is None else sums.sensor
         for body, modulus in self._bodies:
-            arguments = [
-                reference,
-                near,
-                state.x,
-                state.F,
-                v,
-                grad_v,
-                self._D,
-                v if sums.sensor is None else sums.sensor,
-            ]
+            arguments = [reference, near, state.x, state.F, v, grad_v, self._D, sensor]
             self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)

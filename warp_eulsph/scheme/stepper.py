@@ -121,6 +121,13 @@ class Stepper(World, ABC):
     def _update(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.update(state)
+        if self.heated:
+            for medium in self.media:
+                medium.find_heat(state)
+            for condition in self.conditions:
+                condition.reflect(self.heat)
+            for medium in self.media:
+                medium.heat(state)
 
     def _check(self, state: StateArrays) -> None:
         check(self._launch, self.space, state, self.clock.fields)
