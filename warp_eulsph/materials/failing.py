@@ -52,15 +52,19 @@ class Failing(Material):
             )
 
     def constants(self) -> dict[str, Any]:
-        return {"bulk": lame_constants(self.material.young, self.material.poisson)[1], **self.failure.constants()}
+        bulk = lame_constants(self.material.young, self.material.poisson)[1]
+        return {"whole": self.material.constants(), "bulk": bulk, **self.failure.constants()}
 
     def filled_constants(self, law: Law) -> Any:
-        filled = super().filled_constants(law)
+        filled = law.Constants()
         filled.whole = self.material.filled_constants(law._replace(Constants=law.Constants.vars["whole"].type))
+        for name, value in self.constants().items():
+            if name != "whole":
+                setattr(filled, name, value)
         return filled
 
     def law(self, space: Space) -> Law:
-        return _law(space, self.material.law(space), type(self.failure), tuple(self.constants()), self.layers)
+        return _law(space, self.material.law(space), type(self.failure), tuple(self.constants())[1:], self.layers)
 
 
 @functools.cache
