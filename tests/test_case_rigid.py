@@ -1,5 +1,6 @@
 """Rigid bodies in case files."""
 
+import importlib
 import json
 import re
 from pathlib import Path
@@ -7,10 +8,10 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from case_files import small
+from case_files import CASES, small
 
 import warp_eulsph as es
-from warp_eulsph.cases import CaseError, json_schema, parse_case
+from warp_eulsph.cases import CaseError, json_schema, parse_case, read_case
 from warp_eulsph.cases.reading import tomllib
 from warp_eulsph.interactions import Box, Contact, Driven, Free, Plane, RigidBody, Sphere
 from warp_eulsph.output import Run, record
@@ -143,3 +144,13 @@ def test_the_documents_case():
         "ball",
         None,
     ]
+
+
+def test_the_example_is_the_same_in_python(monkeypatch):
+    monkeypatch.syspath_prepend(str(CASES.parent))
+    build = importlib.import_module("sphere_on_plate").build
+    from_file, from_python = read_case(CASES / "sphere_on_plate.toml", ["n=3"]).build(), build(3)
+    for simulation in (from_file, from_python):
+        simulation.step(30)
+    assert from_file.bound_interactions[0].force[2] > 1.0
+    assert (from_file.x == from_python.x).all() and (from_file.v == from_python.v).all()
