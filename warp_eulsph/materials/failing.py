@@ -18,7 +18,7 @@ DRIVE = Variable("failure_drive", "-", "what the criterion has seen; 1 is the on
 
 @dataclass(frozen=True, kw_only=True)
 class Failing(Material):
-    """Ψ = (1 − D) Ψ_whole + D Ψ_p, P = (1 − D) P_whole + D P_p (M23): D = 1 is matter that bears pressure alone.
+    """Ψ = (1 − D) Ψ_whole + D Ψ_p, P = (1 − D) P_whole + D P_p (M24): D = 1 is matter that bears pressure alone.
 
     Ψ_p = κ/2 (ln J)² where J < 1, else nothing. The whole matter lives on in the strains, so that plasticity knows of
     damage as of a smaller section; of its dissipation 1 − D is done, and growing D dissipates (Ψ_whole − Ψ_p) ΔD: books
@@ -29,13 +29,13 @@ class Failing(Material):
         material: the whole matter.
         failure: when it breaks, and what that takes.
         layers: spacings that a crack is spread over, so that its energy per initial volume is G/(``layers`` spacing):
-            2.8 is what plane cracks take in the arrangement of the start, within a tenth (``tests/test_failing.py``).
+            2.5 is what plane cracks take in the arrangement of the start, within a tenth (``tests/test_failing.py``).
     """
 
     density: float = dataclasses.field(init=False)
     material: Isotropic
     failure: Failure
-    layers: float = 2.8
+    layers: float = 2.5
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Isotropic):
