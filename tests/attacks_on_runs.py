@@ -8,10 +8,10 @@ import threading
 import time
 
 import numpy as np
+from bodies import bits
 from faults import HELD, REFUSED, LostError, SilentError, right
 from kept_runs import plate
 from test_damage import CASE, commands, files, mutated
-from test_resume import bits
 
 import warp_eulsph as es
 from warp_eulsph import execution

@@ -20,3 +20,9 @@ def block(dim, n, jitter=0.0, seed=0, **options):
     if jitter:
         x = x + jitter / n * np.random.default_rng(seed).uniform(-1, 1, x.shape)
     return es.Body(**{"x": x, "volume": float(n) ** -dim, "material": RUBBER, **options})
+
+
+def bits(simulation):
+    """All that evolves and what is summed of it, to compare bit by bit."""
+    listed = {name: array.numpy().tobytes() for name, array in simulation.evolving().items()}
+    return {**listed, **simulation.counters, "energy": simulation.energy(), "extrema": simulation.extrema()}

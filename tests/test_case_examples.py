@@ -39,8 +39,9 @@ PYTHON = {
     "twisting_column": (3, lambda n: twisting_column.build(n, es.Always())),
     "vortex": (8, lambda n: vortex.build(n, es.Always(), 0.05)),
 }
-# What tests of their own compare: the drop with its exact solution here, the transported ones in test_transport.py.
-ELSEWHERE = {"drop", "amplification", "cosine_profile"}
+# What tests of their own compare: the drop with its exact solution here, the transported ones in test_transport.py,
+# the sphere with the example in test_case_rigid.py.
+ELSEWHERE = {"drop", "amplification", "cosine_profile", "sphere_on_plate"}
 
 
 def test_every_case_file_has_a_python_twin():

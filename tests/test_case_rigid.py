@@ -1,5 +1,6 @@
 """Rigid bodies in case files."""
 
+import importlib
 import json
 import re
 from pathlib import Path
@@ -7,12 +8,12 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from case_files import small
+from case_files import CASES, small
 
 import warp_eulsph as es
-from warp_eulsph.cases import CaseError, json_schema, parse_case
+from warp_eulsph.cases import CaseError, json_schema, parse_case, read_case
 from warp_eulsph.cases.reading import tomllib
-from warp_eulsph.interactions import Box, Driven, Free, Plane, RigidBody, Sphere
+from warp_eulsph.interactions import Box, Contact, Driven, Free, Plane, RigidBody, Sphere
 from warp_eulsph.output import Run, record
 
 RIGID = {
@@ -71,6 +72,35 @@ def test_probes_record_them(tmp_path):
     assert (run.probes["first"]["x"] == 0.0).all()
 
 
+def two(**changes):
+    """The small case with a second body above the first."""
+    case = small(**changes)
+    above = json.loads(json.dumps(case["body"]["a"]))
+    above["shape"] |= {"lower": [0, 1.01], "upper": [1, 2.01]}
+    case["body"]["b"] = {**above, "velocity": [0, -10]}
+    return case
+
+
+def test_bodies_that_touch_are_one_line():
+    for table in ({}, {"between": [["a", "b"]], "friction": "0.1*3"}):
+        case = parse_case(two(contact=[table]))
+        simulation = case.build()
+        assert isinstance(simulation.interactions[0], Contact)
+        simulation.run(0.01)
+        centre = simulation.v[:16, 1].mean()
+        assert centre < -1.0  # pushed from above
+        assert parse_case(case.describe()).describe() == case.describe()
+        jsonschema.validate(json.loads(json.dumps(case.describe())), json_schema())
+    (contact,) = case.build().interactions
+    assert contact.between == (("a", "b"),) and contact.friction == pytest.approx(0.3)
+    by_kind = parse_case(two(interaction=[{"kind": "Contact"}])).build()
+    assert by_kind.interactions == (Contact(),)
+    with pytest.raises(CaseError, match=r"contact.0.between: unknown body 'c'"):
+        parse_case(two(contact=[{"between": [["a", "c"]]}]))
+    with pytest.raises(CaseError, match=r"contact.0.between.0: list should have at least 2 items"):
+        parse_case(two(contact=[{"between": [["a"]]}]))
+
+
 def test_mistakes_are_named_with_their_place():
     wrong = {
         "table": {"shape": {"kind": "Plain", "normal": [0, 1]}},
@@ -104,7 +134,23 @@ def test_the_documents_case():
     page = (Path(__file__).parents[1] / "docs" / "cases.md").read_text(encoding="utf-8")
     text = next(block for block in re.findall(r"```text\n(.*?)```", page, re.DOTALL) if "[rigid" in block)
     found = tomllib.loads(text)
-    found["rigid"]["ram"]["bodies"] = ["a"]
-    simulation = parse_case(small(**found)).build()
+    found["rigid"]["ram"] |= {"bodies": ["b"], "centre": [0.5, 2.2]}
+    found["rigid"]["ball"]["centre"] = [3, 0.5]
+    simulation = parse_case(two(**found)).build()
     simulation.step(3)
-    assert [each.option.name for each in simulation.bound_interactions] == ["table", "ram", "ball"]
+    assert [getattr(each.option, "name", None) for each in simulation.bound_interactions] == [
+        "table",
+        "ram",
+        "ball",
+        None,
+    ]
+
+
+def test_the_example_is_the_same_in_python(monkeypatch):
+    monkeypatch.syspath_prepend(str(CASES.parent))
+    build = importlib.import_module("sphere_on_plate").build
+    from_file, from_python = read_case(CASES / "sphere_on_plate.toml", ["n=3"]).build(), build(3)
+    for simulation in (from_file, from_python):
+        simulation.step(30)
+    assert from_file.bound_interactions[0].force[2] > 1.0
+    assert (from_file.x == from_python.x).all() and (from_file.v == from_python.v).all()

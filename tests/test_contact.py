@@ -4,37 +4,10 @@ import numpy as np
 import pytest
 import warp as wp
 from bodies import lattice
+from touching import C_P, REFERENCES, SOFT, bar, mean_velocity, rectangle, rings
 
 import warp_eulsph as es
-from warp_eulsph import execution
-from warp_eulsph.geometry import annulus, disc
-
-REFERENCES = pytest.mark.parametrize("arrangement", [es.Convected(), es.Current()], ids=["fixed", "moving"])
-SOFT = es.NeoHookean(density=1000.0, young=1e7, poisson=0.3)
-C_P = float(np.sqrt(1e7 * 0.7 / (1.3 * 0.4) / 1000.0))
-
-
-def rectangle(columns, rows, spacing, at=(0.0, 0.0)):
-    """Centres of square cells above and right of ``at``."""
-    cells = np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5, indexing="ij"), -1).reshape(-1, 2)
-    return cells * spacing + np.array(at)
-
-
-def bar(n, start, length, density, young=1.0, **options):
-    """A bar along x whose waves run at √(young/density), ν = 0."""
-    x = start + (np.arange(n)[:, None] + 0.5) * length / n
-    material = es.NeoHookean(density=density, young=young, poisson=0.0)
-    return es.Body(x=x, volume=length / n, material=material, **options)
-
-
-def mean_velocity(simulation, name):
-    own = simulation.ranges[name]
-    return simulation.v[own.start : own.stop].mean(axis=0)
-
-
-def bits(simulation):
-    listed = {name: array.numpy().tobytes() for name, array in simulation.evolving().items()}
-    return {**listed, **simulation.counters, "energy": simulation.energy()}
+from warp_eulsph.geometry import disc
 
 
 @REFERENCES
@@ -71,7 +44,7 @@ def test_bars_of_other_spacings_and_in_float32():
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_forces_are_the_slopes_of_the_energy(dim, friction):
-    """A block pressed into another of other spacing: the force on it is that of the energy, wherever it lies."""
+    """A block pressed into another of other spacing: forces are those of the energy, and have no moment."""
     n, m = (12, 7) if dim == 2 else (6, 4)
     lower = es.Body(x=lattice(dim, n), volume=n**-dim, material=SOFT, name="lower")
     scale = 0.6
@@ -99,6 +72,38 @@ def test_forces_are_the_slopes_of_the_energy(dim, friction):
         assert pushed > 0.0
         assert on_upper[i] == pytest.approx(-slope, rel=1e-4, abs=1e-6 * pushed)
         np.testing.assert_allclose(on_lower, -on_upper, rtol=1e-12, atol=1e-12 * pushed)
+    f, x = force.numpy(), world.U.x.numpy()
+    moment = (x[:, :, None] * f[:, None] - x[:, None] * f[:, :, None]).sum(axis=0)
+    assert np.abs(moment).max() < 1e-12 * pushed
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_forces_are_the_slopes_where_all_moves(dim):
+    """Every particle displaced at will, normals with them: −∂E/∂x of each, by differences along random directions."""
+    random = np.random.default_rng(3)
+    n = 6 if dim == 2 else 4
+    lower = es.Body(x=lattice(dim, n), volume=n**-dim, material=SOFT, name="lower")
+    upper = es.Body(x=lattice(dim, n) + np.eye(dim)[-1] * 1.02 + 0.3 / n, volume=n**-dim, material=SOFT, name="upper")
+    simulation = es.Simulation([lower, upper], interactions=[es.Contact()])
+    contact, world = simulation.bound_interactions[0], simulation.stepper
+    x = simulation.x + random.uniform(-0.1, 0.1, simulation.x.shape) / n
+    x[len(lower.x) :, -1] -= 0.5 / n
+
+    def energy_at(places):
+        world.U.x.assign(places)
+        return contact.energy(world)
+
+    held = energy_at(x)
+    force = wp.zeros(world.n, dtype=world.space.vec, device=world.device)
+    contact.forces(world, world.U, 0.0, force)
+    f = force.numpy()
+    assert held > 0.0
+    for _ in range(5):
+        aside = random.normal(size=x.shape)
+        slope = (energy_at(x + 1e-6 / n * aside) - energy_at(x - 1e-6 / n * aside)) / (2e-6 / n)
+        assert slope == pytest.approx(-(f * aside).sum(), rel=1e-5, abs=1e-5 * np.abs(f).sum())
+    moment = (x[:, :, None] * f[:, None] - x[:, None] * f[:, :, None]).sum(axis=0)
+    assert np.abs(moment).max() < 1e-12 * np.abs(f).sum()
 
 
 @REFERENCES
@@ -177,15 +182,6 @@ def incline(friction, arrangement=es.Convected()):
     )
 
 
-def rings(speed, circles=4, **options):
-    """Two rubber rings that fly at each other, each at ``speed`` of its pressure waves."""
-    x, volume = annulus(centre=(0.0, 0.0), inner=0.7, outer=1.0, rings=circles)
-    v = speed * C_P
-    left = es.Body(x=x, volume=volume, material=SOFT, velocity=(v, 0.0), name="left")
-    right = es.Body(x=x + np.array([2.1, 0.1]), volume=volume, material=SOFT, velocity=(-v, 0.0), name="right")
-    return es.Simulation([left, right], interactions=[es.Contact()], **options)
-
-
 @pytest.mark.parametrize("speed", [0.05, 0.15, 0.3])
 def test_rings_give_their_energy_back(speed):
     """Off centre: what they lose is the dissipation's; momenta are kept."""
@@ -195,13 +191,13 @@ def test_rings_give_their_energy_back(speed):
     for _ in simulation.frames(np.linspace(0.4, 3.0, 6) / (speed * C_P)):
         held = max(held, simulation.energy()["held"])
     energy = simulation.energy()
-    assert held > 5e-4 * start and energy["held"] < 0.1 * held
+    assert held > 5e-4 * start
     assert mean_velocity(simulation, "left")[0] < 0.0 < mean_velocity(simulation, "right")[0]
-    assert abs(energy["interaction"]) < 0.03 * start
+    assert abs(energy["interaction"]) < 0.01 * start
     assert abs(energy["residual"]) < 1e-11 * start
     scale = simulation.particles.mass.numpy().sum() * speed * C_P
     assert np.abs(simulation.momentum() - momentum).max() < 1e-13 * scale
-    assert abs(simulation.angular_momentum() - about)[0] < 0.01 * scale
+    assert abs(simulation.angular_momentum() - about)[0] < 1e-3 * scale
 
 
 @REFERENCES
@@ -225,7 +221,8 @@ def test_a_square_hits_a_face(angle, speed, arrangement):
         assert (own[:, 1] > beside).all()
     energy = simulation.energy()
     assert mean_velocity(simulation, "square")[1] > -0.6 * speed * C_P
-    assert -0.04 * start < energy["interaction"] < 0.01 * start
+    # the error of the steps; where a shocked solid is read anew, its surface changes too
+    assert -0.015 * start < energy["interaction"] < (0.001 if isinstance(arrangement, es.Convected) else 0.06) * start
     assert np.abs(simulation.momentum() - momentum).max() < 1e-12 * np.abs(momentum).max()
 
 
@@ -291,87 +288,3 @@ def test_cubes_in_three_dimensions():
     assert mean_velocity(simulation, "lower")[2] < 0.0 < mean_velocity(simulation, "upper")[2]
     assert np.abs(simulation.momentum()).max() < 1e-9
     assert abs(energy["interaction"]) < 0.03 * start and abs(energy["residual"]) < 1e-11 * start
-
-
-@pytest.mark.parametrize("scheme", [es.Verlet(), es.LaxWendroff()], ids=["Verlet", "LaxWendroff"])
-@pytest.mark.parametrize("arrangement", [es.Convected(), es.Current()], ids=["fixed", "moving"])
-def test_resumed_runs_go_on_bit_for_bit(scheme, arrangement):
-    """With friction and while they slide; a look at the energy in between changes nothing."""
-
-    def build():
-        simulation = rings(0.15, scheme=scheme, arrangement=arrangement)
-        return es.Simulation(
-            simulation.bodies, interactions=[es.Contact(friction=0.4)], scheme=scheme, arrangement=arrangement
-        )
-
-    whole, resumed = build(), build()
-    steps = 90 if isinstance(scheme, es.Verlet) else 220
-    whole.step(steps)
-    assert whole.energy()["held"] > 0.0
-    arrays, counters = {name: array.numpy().copy() for name, array in whole.evolving().items()}, whole.counters
-    resumed.step(4)
-    resumed.restore(arrays, counters)
-    whole.step(15)
-    resumed.step(7)
-    resumed.energy()
-    resumed.step(8)
-    assert bits(resumed) == bits(whole)
-    assert np.abs(whole.bound_interactions[0].slip.numpy()).max() > 0.0
-
-
-@pytest.mark.of_the_cpu
-def test_the_same_bits_on_any_number_of_threads():
-    found = []
-    for threads in (1, 3):
-        execution.set_threads(threads)
-        h = 0.02
-        lower = es.Body(x=rectangle(100, 50, h), volume=h * h, material=SOFT, name="lower")
-        upper = es.Body(
-            x=rectangle(100, 50, h, (0.31, 1.0)), volume=h * h, material=SOFT, velocity=(1.0, -2.0), name="upper"
-        )
-        simulation = es.Simulation([lower, upper], interactions=[es.Contact(friction=0.3)])
-        simulation.step(15)
-        found.append(bits(simulation))
-    assert found[0] == found[1]
-
-
-def test_it_searches_only_when_something_has_moved():
-    simulation = rings(0.05)
-    simulation.step(100)
-    nearby = simulation.bound_interactions[0].nearby
-    assert 0 < nearby.searches < 15
-
-
-def test_only_the_named_pairs_touch(caplog):
-    """The third passes through, and somebody says so; the others are not told of."""
-    bodies = [bar(20, 0.0, 1.0, 1.0, velocity=0.3, name="a"), bar(20, 1.1, 1.0, 1.0, name="b")]
-    bodies += [bar(20, 2.1, 1.0, 1.0, velocity=-0.3, name="c")]
-    simulation = es.Simulation(bodies, interactions=[es.Contact(between=[("a", "b")])])
-    simulation.run(1.0)
-    assert "'b' and 'c' overlap or touch" in caplog.text and "'a' and 'b'" not in caplog.text
-    assert mean_velocity(simulation, "c")[0] == pytest.approx(-0.3, rel=1e-6)
-    assert np.abs(simulation.interaction_force[40:]).max() == 0.0
-
-
-def test_bad_set_ups_get_one_clear_error():
-    h = 0.1
-    one = es.Body(x=rectangle(8, 8, h), volume=h * h, material=SOFT, name="one")
-    two = es.Body(x=rectangle(8, 8, h, (0.33, 0.71)), volume=h * h, material=SOFT, name="two")
-    with pytest.raises(
-        ValueError, match=r"'one' and 'two' do: \d+ and \d+ particles, the nearest 0\.\d+ spacings apart"
-    ):
-        es.Simulation([one, two], interactions=[es.Contact()])
-    inside = es.Body(x=rectangle(2, 2, h, (0.35, 0.35)), volume=h * h, material=SOFT, name="two")
-    with pytest.raises(ValueError, match="must not lie in each other"):
-        es.Simulation([one, inside], interactions=[es.Contact()])
-    with pytest.raises(ValueError, match="two bodies that are not bonded are needed"):
-        es.Simulation([one], interactions=[es.Contact()])
-    apart = es.Body(x=rectangle(8, 8, h, (0.0, 2.0)), volume=h * h, material=SOFT, name="two")
-    with pytest.raises(ValueError, match=r"bodies must be among \['one', 'two'\], got 'tow'"):
-        es.Simulation([one, apart], interactions=[es.Contact(between=[("one", "tow")])])
-    with pytest.raises(ValueError, match="between must be pairs of names"):
-        es.Contact(between=["one", "two"])
-    with pytest.raises(ValueError, match="friction must be 0 or more"):
-        es.Contact(friction=-0.1)
-    with pytest.raises(ValueError, match="periodic boxes"):
-        es.Simulation([one, apart], interactions=[es.Contact()], periodic=[4.0, 4.0])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import warp as wp
+from bodies import bits
 from case_files import small
 from kept_runs import StopAfter
-from test_resume import bits
 
 import warp_eulsph as es
 from warp_eulsph import execution

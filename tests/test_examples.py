@@ -72,6 +72,13 @@ def test_spinning_plate_converges(run):
         assert fine[name] < 0.8 * coarse[name]  # the radius: 0.097, 0.074, 0.031 at 12, 24, 48
 
 
+def test_sphere_on_plate(run):
+    figures, frames = run("sphere_on_plate", "-n", "3")
+    assert frames == 10
+    assert abs(figures["speed of the sphere at last [m/s]"]) < 1.0  # of 3: the plate has most of its momentum
+    assert 0.02 < figures["deepest [m]"] < 0.06
+
+
 def test_bending_column(run):
     figures, _ = run("bending_column", "-n", "6", "--reference", "total")
     assert figures["energy kept"] > 0.95

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import warp as wp
-from bodies import RUBBER, block, lattice
+from bodies import RUBBER, bits, block, lattice
 
 import warp_eulsph as es
 from warp_eulsph import execution
@@ -158,11 +158,6 @@ class BoundAnchor(BoundInteraction):
 
     def evolving(self):
         return {"x": self.x, "v": self.v}
-
-
-def bits(simulation):
-    listed = {name: array.numpy().tobytes() for name, array in simulation.evolving().items()}
-    return {**listed, **simulation.counters, "energy": simulation.energy()}
 
 
 def colliding(dtype=wp.float64, **options):

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import warp as wp
+from bodies import bits
 from clouds import cloud
 
 import warp_eulsph as es
@@ -43,11 +44,6 @@ def drop(**options):
 def state(simulation, name):
     where = simulation.ranges[name]
     return {field: getattr(simulation, field)[where.start : where.stop] for field in ("x", "v", "F")}
-
-
-def bits(simulation):
-    listed = {name: array.numpy().tobytes() for name, array in simulation.evolving().items()}
-    return {**listed, **simulation.counters, "energy": simulation.energy(), "extrema": simulation.extrema()}
 
 
 OPTIONS = {

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import warp as wp
-from bodies import RUBBER, lattice
+from bodies import RUBBER, bits, lattice
 
 import warp_eulsph as es
 from warp_eulsph.boundaries import Bound
@@ -99,11 +99,6 @@ def spoil(simulation, changed):
         if arrays[path].dtype in (wp.int32, wp.uint64):
             continue  # lists, whose old entries are as wrong as any but crash no kernel
         arrays[path].assign(np.full_like(arrays[path].numpy(), np.nan))
-
-
-def bits(simulation):
-    listed = {name: array.numpy().tobytes() for name, array in simulation.evolving().items()}
-    return {**listed, **simulation.counters, "energy": simulation.energy(), "extrema": simulation.extrema()}
 
 
 def resume_is_exact(build, before, after):

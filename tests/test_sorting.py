@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 import warp as wp
-from bodies import RUBBER
+from bodies import RUBBER, bits
 from clouds import cloud
 from kept_runs import StopAfter, contents, killed_until_done
 from test_materials import Remembering
-from test_resume import REFERENCES, SCHEMES, bits
+from test_resume import REFERENCES, SCHEMES
 
 import warp_eulsph as es
 from warp_eulsph import boundaries, execution, sorting

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from bodies import RUBBER, lattice
-from test_resume import bits, reachable
+from bodies import RUBBER, bits, lattice
+from test_resume import reachable
 from test_sorting import shuffle, two_blocks
 
 import warp_eulsph as es

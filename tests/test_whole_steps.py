@@ -7,10 +7,10 @@ import time
 
 import numpy as np
 import pytest
+from bodies import bits
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kept_runs import plate, recording
-from test_resume import bits
 
 import warp_eulsph as es
 from warp_eulsph.output import record, write_snapshot

@@ -28,7 +28,7 @@ from .boundaries import (
     Wall,
     mirror,
 )
-from .interactions import Contact, Interaction
+from .interactions import Contact, Interaction, RigidBody
 from .kernel_cache import rebuild_damaged
 from .materials import (
     Bar,
@@ -115,6 +115,7 @@ __all__ = [
     "QuinticSpline",
     "ReferencePolicy",
     "Region",
+    "RigidBody",
     "Roller",
     "SaintVenantKirchhoff",
     "Scheme",

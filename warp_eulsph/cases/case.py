@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
 from ..building import Options, options_of
-from ..interactions import Interaction, RigidBody
+from ..interactions import Contact, Interaction, RigidBody
 from ..materials import Material
 from ..output import DEFAULT_FIELDS, FIELDS, Probe
 from ..scheme.arrangement import Arrangement
@@ -119,6 +119,7 @@ class Case(Problem):
     rigid: dict[str, table_of(RigidBody, sole=True, without=("name",))] = Field(  # type: ignore[valid-type]
         {}, description="rigid bodies by name"
     )
+    contact: list[one_of(Contact)] = Field([], description="bodies that touch; empty [[contact]]: all with all")  # type: ignore
     interaction: list[open_choice(Interaction)] = Field([], description="other forces between bodies")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
@@ -164,7 +165,7 @@ class Case(Problem):
         return Simulation(
             bodies,
             boundaries=[*conditions, *ghosts],
-            interactions=[*rigid, *[interaction.make(space) for interaction in self.interaction]],
+            interactions=[*rigid, *[table.make(space) for table in [*self.contact, *self.interaction]]],
             time_step=self.time_step.make(),
             **defaults._asdict(),
             periodic=self.periodic,
@@ -218,11 +219,12 @@ class Case(Problem):
                 wrong.append(
                     f"{path}.rigid: unknown rigid body {of!r}{nearest(of, self.rigid)}; they are {sorted(self.rigid)}"
                 )
-        for path, of in [(f"rigid.{name}", of) for name, table in self.rigid.items() for of in table.bodies or ()]:
+        touched = [(f"rigid.{name}.bodies", of) for name, table in self.rigid.items() for of in table.bodies or ()]
+        for k, contact in enumerate(self.contact):
+            touched += [(f"contact.{k}.between", of) for two in contact.between or () for of in two]
+        for path, of in touched:
             if of not in self.body:
-                wrong.append(
-                    f"{path}.bodies: unknown body {of!r}{nearest(of, self.body)}; bodies are {sorted(self.body)}"
-                )
+                wrong.append(f"{path}: unknown body {of!r}{nearest(of, self.body)}; bodies are {sorted(self.body)}")
         names = [table.name for _, table in probes]
         wrong += [f"probe.{k}.name: is taken by another, got {n!r}" for k, n in enumerate(names) if n in names[:k]]
         if wrong:

@@ -1,5 +1,6 @@
 """Interactions: forces between bodies, or between bodies and something that moves beside them."""
 
+from ..options import explain_mistakes
 from .base import BoundInteraction, Interaction
 from .contact import Contact
 from .free import Free
@@ -28,3 +29,7 @@ __all__ = [
     "Sphere",
     "TriangleMesh",
 ]
+
+explain_mistakes(
+    ["Box", "Cylinder", "Driven", "Free", "Held", "Moving", "Plane", "Sphere", "TriangleMesh"], globals()
+)  # the package's front door has the others

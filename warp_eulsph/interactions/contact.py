@@ -38,7 +38,7 @@ class Contact(Interaction):
     with w half a spacing, r and r_t the distance along the normal n and across it, A the face of a particle, and φ the
     cubic spline of dimension d − 1, h = 1.2 of the larger spacing. n is that of planes through the outermost particles
     around. Pairs are antisymmetric in every bit. Friction is Coulomb's: half cells are sheared elastically until the
-    stress is ``friction`` times the pressure, then they slide. See docs/contact.md.
+    stress is ``friction`` times the pressure, then they slide..
 
     Args:
         between: pairs of names of bodies that touch each other; all with all if None. Bonded bodies are one.
@@ -112,6 +112,7 @@ class BoundContact(BoundInteraction):
             setattr(self._arrays, name, getattr(self.skin, name))
         k, n, device = len(self.skin.indices), world.n, world.device
         self._energy = wp.zeros(k, dtype=wp.float64, device=device)
+        self._slope = wp.zeros(k, dtype=self.space.vec, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
         self.slip = wp.zeros(k if self.rubs else 0, dtype=self.space.vec, device=device)
         self._found_at = wp.zeros(k if self.skin.changes else 0, dtype=self.space.vec, device=device)
@@ -164,8 +165,9 @@ class BoundContact(BoundInteraction):
         if self.nearby.pairs:
             self.skin.look(state)
             arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.clock.fields, fraction]
-            arguments += [self.option.friction, self.slip, out, self._energy]
+            arguments += [self.option.friction, self.slip, out, self._slope, self._energy]
             self._launch(make_push(self.space, self.rubs), len(self.skin.indices), arguments)
+            self.skin.turn(state, self._slope, out)
         return self.nearby.pairs > 0
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
@@ -192,5 +194,10 @@ class BoundContact(BoundInteraction):
     def evolving(self) -> dict[str, wp.array]:
         held = {"slip": self.slip} if self.rubs else {}
         if self.skin.changes:
-            held |= {"found_at": self._found_at, "there": self.skin.there, "area": self.skin.area}
+            held |= {
+                "found_at": self._found_at,
+                "there": self.skin.there,
+                "area": self.skin.area,
+                "bend": self.skin.bend,
+            }
         return held

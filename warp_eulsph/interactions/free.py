@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..boundaries import Assembly
 from ..checks import positive, real_array, real_number, short
+from ..structs import ClockArrays
 from .rigid_motion import BoundRigidMotion, Pose, RigidMotion, Wrench, rotation, spatial, turning
 from .shapes import Solid
 
@@ -83,16 +83,16 @@ class BoundFree(BoundRigidMotion):
         inverse[3 - count :] = 1.0 / inertia[3 - count :]
         self.inverse_mass, self.inverse_inertia, self._own = 1.0 / mass, wp.vec3d(*inverse), Wrench(*own)
 
-    def look(self, clock: Any, fraction: float) -> None:
+    def look(self, clock: ClockArrays, fraction: float) -> None:
         self._drift(clock, fraction, self.at)
 
-    def advance(self, clock: Any, wrench: wp.array) -> None:
+    def advance(self, clock: ClockArrays, wrench: wp.array) -> None:
         self._drift(clock, 0.5, self.pose)
         arguments = [wrench, self._own, self.inverse_mass, self.inverse_inertia, clock.dt, self.pose, self.work]
         self._launch.once(_kick, 1, arguments)
         self._drift(clock, 0.5, self.pose)
 
-    def _drift(self, clock: Any, fraction: float, out: Pose) -> None:
+    def _drift(self, clock: ClockArrays, fraction: float, out: Pose) -> None:
         self._launch.once(_drift, 1, [self.pose, self.inverse_inertia, clock.dt, fraction, out])
 
     def kinetic(self) -> float:

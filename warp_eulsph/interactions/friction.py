@@ -7,8 +7,8 @@ import warp as wp
 
 from ..fields import clock_structure
 from ..space import Space
+from .faces import surface_weight
 from .law import meeting, pressure, rows_structure, skin_structure, stiffness
-from .skin import surface_weight
 
 
 @functools.cache

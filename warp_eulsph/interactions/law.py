@@ -8,7 +8,7 @@ import warp as wp
 from ..atomics import raise_to
 from ..fields import clock_structure, structure
 from ..space import Space
-from .skin import REACH, surface_weight
+from .faces import REACH, surface_weight
 
 # Scatter of a surface around its plane, over its extent, below which it is flat: 3 % of a spacing.
 FLAT = 1.0e-3
@@ -52,15 +52,22 @@ def rows_structure() -> Any:
 
 @functools.cache
 def facing(space: Space) -> Any:
-    """``wp.func`` how much two normals face each other: 1 up to 60° from opposite, 0 from 75.5° on."""
-    real, vec = space.real, space.vec
+    """``wp.func`` row: how much two normals face each other, and its slope with n·n'.
+
+    1 up to 60° from opposite, 0 from 75.5° on.
+    """
+    real, vec, pair = space.real, space.vec, space.row(2)
 
     @wp.func
-    def facing(n: vec, other: vec) -> real:
-        share = wp.clamp(real(-4.0) * wp.dot(n, other) - real(1.0), real(0.0), real(1.0))
+    def facing(n: vec, other: vec) -> pair:
+        share = real(-4.0) * wp.dot(n, other) - real(1.0)
         if wp.length_sq(n) == real(0.0) or wp.length_sq(other) == real(0.0):
             share = real(1.0)  # fragments face all
-        return share
+        if share >= real(1.0):
+            return pair(real(1.0), real(0.0))
+        if share <= real(0.0):
+            return pair(real(0.0), real(0.0))
+        return pair(share, real(-4.0))
 
     return facing
 
@@ -87,28 +94,35 @@ def pressure(space: Space) -> Any:
 
 @functools.cache
 def meeting(space: Space) -> Any:
-    """``wp.func`` (skin, lower, upper, d) -> normal from lower to upper, row (r, r0, |r_t|, h, share · A_a A_b).
+    """``wp.func`` (skin, lower, upper, d) -> normal n, row (r, r0, |r_t|, h, share · A_a A_b, q, q', slope).
+
+    q and q' are how much n follows the normals of both, ∂n/∂n_a = q (1 − n⊗n) and ∂n/∂n_b = −q' (1 − n⊗n); the slope is
+    that of share · A_a A_b with n_a·n_b.
 
     The normal of the flatter surface counts for more: that of a face, where a corner meets it. (A tilt of a thousandth
     there is a false gap of a thousandth of a spacing, and a pressure of K/1000.)
     """
-    real, vec, SkinArrays, row = space.real, space.vec, skin_structure(space), space.row(5)
+    real, vec, SkinArrays, row = space.real, space.vec, skin_structure(space), space.row(8)
     facing_of = facing(space)
 
     @wp.func
     def meeting(skin: SkinArrays, lower: int, upper: int, d: vec):
-        along = (skin.bend[upper] * skin.bend[upper] + real(wp.static(FLAT**2))) * skin.normal[lower]
-        along -= (skin.bend[lower] * skin.bend[lower] + real(wp.static(FLAT**2))) * skin.normal[upper]
+        q = skin.bend[upper] * skin.bend[upper] + real(wp.static(FLAT**2))
+        q_other = skin.bend[lower] * skin.bend[lower] + real(wp.static(FLAT**2))
+        along = q * skin.normal[lower] - q_other * skin.normal[upper]
         if wp.length_sq(along) == real(0.0):
             along = d
-        n = wp.normalize(along)
+            q = real(0.0)
+            q_other = real(0.0)
+        size = wp.length(along)
+        n = along / size
         r = wp.dot(n, d)
         r0 = skin.half[lower] + skin.half[upper]
         h = real(wp.static(2.0 * REACH)) * wp.max(skin.half[lower], skin.half[upper])
-        areas = facing_of(skin.normal[lower], skin.normal[upper]) * skin.area[lower] * skin.area[upper]
+        areas = facing_of(skin.normal[lower], skin.normal[upper]) * (skin.area[lower] * skin.area[upper])
         if r <= -r0:  # behind each other: the far sides of what is thin
-            areas = real(0.0)
-        return n, row(r, r0, wp.length(d - n * r), h, areas)
+            areas = areas * real(0.0)
+        return n, row(r, r0, wp.length(d - n * r), h, areas[0], q / size, q_other / size, areas[1])
 
     return meeting
 
@@ -134,8 +148,9 @@ def stiffness(space: Space) -> Any:
 def make_push(space: Space, rubs: bool) -> Any:
     """Kernel: forces of contact of the rows, and half of the energy of each pair; with friction where it ``rubs``.
 
-    A pair is seen from its lower number at both ends, so that both find the same bits. ``slip`` is as in
-    ``friction.py``, and ahead by ``fraction`` Δt.
+    A pair is seen from its lower number at both ends, so that both find the same bits. ``slope`` takes what the energy
+    changes by with the normal of each, without friction. ``slip`` is as in ``friction.py``, and ahead by ``fraction``
+    Δt.
     """
     real, vec, SkinArrays, Rows = space.real, space.vec, skin_structure(space), rows_structure()
     Clock, meeting_of, stiffness_of, pressure_of = (
@@ -158,10 +173,12 @@ def make_push(space: Space, rubs: bool) -> Any:
         friction: real,
         slip: wp.array(dtype=vec),
         out: wp.array(dtype=vec),
+        slope: wp.array(dtype=vec),
         energy: wp.array(dtype=wp.float64),
     ):
         k = first + wp.tid()
         force = vec()
+        turned = vec()
         stored = real(0.0)
         for i in range(rows.start[k], rows.start[k + 1]):
             lower = wp.min(k, rows.index[i])
@@ -175,8 +192,11 @@ def make_push(space: Space, rubs: bool) -> Any:
                 p = pressure_of(how[0], how[1])
                 beside = d - n * how[0]
                 weight = weight_of(how[2], how[3])
-                pushed = n * (weight * K * p[0]) + beside * (slope_of(how[2], how[3]) * K * p[1])
+                along = weight * K * p[0]
+                aside = slope_of(how[2], how[3]) * K * p[1]
+                pushed = n * along + beside * aside
                 stored += how[4] * weight * K * p[1]
+                lean = beside * (how[4] * (how[0] * aside - along))  # the slope of the energy with n
                 if wp.static(rubs):
                     u = (slip[lower] - slip[upper]) * real(0.5) + (v[b] - v[a]) * real(fraction * clock.dt[0])
                     u = u - n * wp.dot(n, u)
@@ -185,12 +205,16 @@ def make_push(space: Space, rubs: bool) -> Any:
                         u = wp.normalize(u) * (most / stiff[1])
                     pushed -= u * (weight * stiff[1])
                     stored += real(0.5) * how[4] * weight * stiff[1] * wp.length_sq(u)
+                facing_slope = how[7] * weight * K * p[1]
                 if k == lower:
                     force -= pushed * how[4]
+                    turned += lean * how[5] + skin.normal[upper] * facing_slope
                 else:
                     force += pushed * how[4]
+                    turned += skin.normal[lower] * facing_slope - lean * how[6]
         if rows.start[k + 1] > rows.start[k]:
             out[skin.places[k]] = out[skin.places[k]] + force
+        slope[k] = turned
         energy[k] = wp.float64(0.5) * wp.float64(stored)
 
     return push

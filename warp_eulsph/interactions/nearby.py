@@ -10,8 +10,9 @@ from ..atomics import raise_to
 from ..execution import Launcher
 from ..operators.neighbours import QUERY_MARGIN
 from ..space import Space
+from .faces import REACH
 from .law import rows_structure
-from .skin import REACH, Skin
+from .skin import Skin
 
 # How far beyond the range of forces rows reach, in spacings: a search lasts until a particle has moved half of that.
 MARGIN = 1.0

@@ -32,7 +32,7 @@ def trace_structure(space: Space) -> Any:
 
 
 @functools.cache
-def _read_row(space: Space) -> Any:
+def _read_row(space: Space) -> wp.Function:
     """``wp.func``: Σ ω f over the row of a point, in three components."""
     vec, dim, TracePoints = space.vec, space.dim, trace_structure(space)
 
@@ -49,7 +49,7 @@ def _read_row(space: Space) -> Any:
 
 
 @functools.cache
-def _gap(distance: Any) -> Any:
+def _gap(distance: Any) -> wp.Function:
     """``wp.func``: unit normal out of the rigid body, and the distance [m] of a place from it."""
 
     @wp.func
@@ -63,7 +63,7 @@ def _gap(distance: Any) -> Any:
 
 
 @functools.cache
-def make_measure(space: Space, distance: Any) -> Any:
+def make_measure(space: Space, distance: Any) -> wp.Kernel:
     vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -85,7 +85,7 @@ def make_measure(space: Space, distance: Any) -> Any:
 
 
 @functools.cache
-def make_press(space: Space, distance: Any) -> Any:
+def make_press(space: Space, distance: Any) -> wp.Kernel:
     """Kernel: the force of the rigid body on each point, what it does to the rigid body, and the energy it holds."""
     vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
 
@@ -116,7 +116,7 @@ def make_press(space: Space, distance: Any) -> Any:
 
 
 @functools.cache
-def make_gather(space: Space) -> Any:
+def make_gather(space: Space) -> wp.Kernel:
     """Kernel: each particle takes its shares of the forces on the points that it is a member of."""
     vec, dim, real = space.vec, space.dim, space.real
 
@@ -143,7 +143,7 @@ def make_gather(space: Space) -> Any:
 
 
 @functools.cache
-def make_ask(space: Space, distance: Any) -> Any:
+def make_ask(space: Space, distance: Any) -> wp.Kernel:
     """Kernel: squares of frequencies [1/s²] of the points that touch, or may in the step to come.
 
     The largest k Σ ω²/m of a point, and k (1/M + r²/I) of each, which add up to a bound for the rigid body.
@@ -182,7 +182,7 @@ def make_ask(space: Space, distance: Any) -> Any:
 
 
 @functools.cache
-def make_raise(space: Space) -> Any:
+def make_raise(space: Space) -> wp.Kernel:
     Clock, real = clock_structure(space), space.real
 
     @wp.kernel(module="unique", enable_backward=False)

@@ -10,6 +10,7 @@ import warp as wp
 from ..boundaries import Assembly
 from ..execution import Launcher
 from ..reduce import Sum
+from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .free import Free
 from .pressing import make_ask, make_gather, make_measure, make_press, make_raise, trace_structure
@@ -165,11 +166,11 @@ class BoundRigidBody(BoundInteraction):
                 "touches by bodies=[...]"
             )
 
-    def _press(self, state: Any) -> None:
+    def _press(self, state: StateArrays) -> None:
         arguments = [self._points, state.x, self.motion.at, *self._shape, self._push, self._wrenches, self._energies]
         self._launch(make_press(self.space, self.option.shape.distance), len(self._push), arguments)
 
-    def forces(self, world: "World", state: Any, fraction: float, out: wp.array) -> None:
+    def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
         self.motion.look(world.clock.fields, fraction)
         self._press(state)
         self._add_wrenches(self._wrenches, self._wrench)
@@ -199,37 +200,42 @@ class BoundRigidBody(BoundInteraction):
     def evolving(self) -> dict[str, wp.array]:
         return {**self.motion.evolving(), "wrench": self._wrench}
 
+    def _row(self, array: wp.array, components: slice) -> np.ndarray:
+        return np.array(array.numpy()[0, components])  # a copy: on the CPU it is the array's own memory
+
     @property
     def x(self) -> np.ndarray:
         """Where the centre of mass is [m], (dim,)."""
-        return self.motion.pose.x.numpy()[0, : self.space.dim]
+        return self._row(self.motion.pose.x, slice(self.space.dim))
 
     @property
     def v(self) -> np.ndarray:
         """Velocity of the centre of mass [m/s], (dim,)."""
-        return self.motion.pose.v.numpy()[0, : self.space.dim]
+        return self._row(self.motion.pose.v, slice(self.space.dim))
 
     @property
     def R(self) -> np.ndarray:
         """Rotation since the shape lay unturned, (3, 3)."""
-        return self.motion.pose.R.numpy()[0] @ self._solid.axes.T
+        rotation: np.ndarray = self.motion.pose.R.numpy()[0] @ self._solid.axes.T
+        return rotation
 
     @property
     def spin(self) -> np.ndarray:
         """Angular velocity [rad/s], (3,) in 3-D, (1,) in 2-D, (0,) in 1-D."""
-        return self.motion.pose.spin.numpy()[0, AXIAL[self.space.dim]]
+        return self._row(self.motion.pose.spin, AXIAL[self.space.dim])
 
     @property
     def angular_momentum(self) -> np.ndarray:
         """About the centre of mass [kg m²/s], as ``spin``; 0 unless it is free."""
-        return self.motion.pose.L.numpy()[0, AXIAL[self.space.dim]]
+        return self._row(self.motion.pose.L, AXIAL[self.space.dim])
 
     @property
     def force(self) -> np.ndarray:
         """Force of the bodies on it in the last step [N], (dim,)."""
-        return self._wrench.numpy()[0, : self.space.dim]
+        return self._row(self._wrench, slice(self.space.dim))
 
     @property
     def torque(self) -> np.ndarray:
         """Moment of the bodies on it about its centre of mass in the last step [N m], as ``spin``."""
-        return self._wrench.numpy()[0, 3:][AXIAL[self.space.dim]]
+        axial = AXIAL[self.space.dim]
+        return self._row(self._wrench, slice(3 + axial.start, 3 + axial.stop))

@@ -16,6 +16,7 @@ from ..checks import real_array, short
 from ..execution import Launcher
 from ..fields import clock_structure
 from ..space import Space
+from ..structs import ClockArrays
 from .shapes import Solid
 
 #: Force [N] and moment about the centre of mass [N m], three components each, of bodies on a rigid one.
@@ -40,7 +41,7 @@ class Pose:
 POSE = ("x", "R", "v", "L", "spin")
 
 
-def make_pose(x: np.ndarray, R: np.ndarray, device: Any) -> Pose:
+def make_pose(x: np.ndarray, R: np.ndarray, device: wp.DeviceLike) -> Pose:
     """A pose at rest."""
     pose = Pose()
     pose.x, pose.R = wp.array([x], dtype=wp.vec3d, device=device), wp.array([R], dtype=wp.mat33d, device=device)
@@ -117,15 +118,15 @@ class BoundRigidMotion:
     inverse_mass = 0.0
     inverse_inertia = wp.vec3d()
 
-    def __init__(self, space: Space, pose: Pose, device: Any):
+    def __init__(self, space: Space, pose: Pose, device: wp.DeviceLike):
         self.space, self.pose, self._launch = space, pose, Launcher(device)
         self.at = make_pose(pose.x.numpy()[0], pose.R.numpy()[0], device)
         self.work = wp.zeros(1, dtype=wp.float64, device=device)
 
-    def look(self, clock: Any, fraction: float) -> None:
+    def look(self, clock: ClockArrays, fraction: float) -> None:
         """Pose ``at`` time t + fraction · Δt."""
 
-    def advance(self, clock: Any, wrench: wp.array) -> None:
+    def advance(self, clock: ClockArrays, wrench: wp.array) -> None:
         """Pose ``pose`` at the end of the step, in which bodies pushed by ``wrench``."""
 
     def kinetic(self) -> float:
@@ -138,7 +139,7 @@ class BoundRigidMotion:
 
 
 @functools.cache
-def _make_carry(space: Space, along: bool) -> Any:
+def _make_carry(space: Space, along: bool) -> wp.Kernel:
     """Kernel: the pose that is prescribed for time t + fraction · Δt, and the velocity there.
 
     ``along`` a displacement of one row, otherwise at a constant velocity.
@@ -211,14 +212,14 @@ class Prescribed(BoundRigidMotion):
             ]
             self.recordable = self._values[0].recordable
 
-    def look(self, clock: Any, fraction: float) -> None:
+    def look(self, clock: ClockArrays, fraction: float) -> None:
         rows = self._rows
         if self._along:
             now, before = self._values
             rows = [now.at(self._centre, clock, fraction), before.at(self._centre, clock, fraction - 1.0)]
         self._launch.once(_make_carry(self.space, self._along), 1, [clock, fraction, self.start, *rows, self.at])
 
-    def advance(self, clock: Any, wrench: wp.array) -> None:
+    def advance(self, clock: ClockArrays, wrench: wp.array) -> None:
         self.look(clock, 0.0)
         self._launch.once(_settle, 1, [wrench, self.at, clock.dt, self.pose, self.work])
 

@@ -58,7 +58,7 @@ class Shape(ABC):
     distance: Any
 
     @abstractmethod
-    def solid(self, dim: int, device: Any) -> Solid:
+    def solid(self, dim: int, device: wp.DeviceLike) -> Solid:
         """The shape in ``dim`` dimensions.
 
         Raises:
@@ -145,7 +145,7 @@ class Plane(Shape):
     normal: Sequence[float]
     distance = plane_distance
 
-    def solid(self, dim: int, device: Any) -> Solid:
+    def solid(self, dim: int, device: wp.DeviceLike) -> Solid:
         normal = np.zeros(3)
         normal[:dim] = unit_vector(self.normal, dim, "Plane")
         return simple(math.inf, [0.0] * 3, normal.tolist())
@@ -168,7 +168,7 @@ class Sphere(Shape):
     def __post_init__(self) -> None:
         positive(self.radius, "Sphere: radius", "give it in m")
 
-    def solid(self, dim: int, device: Any) -> Solid:
+    def solid(self, dim: int, device: wp.DeviceLike) -> Solid:
         r = self.radius
         volume = {1: 2.0 * r, 2: math.pi * r**2, 3: 4.0 / 3.0 * math.pi * r**3}[dim]
         return simple(volume, [(0.5 if dim == 2 else 0.4) * r**2] * 3, [r])
@@ -193,7 +193,7 @@ class Box(Shape):
         if sides.ndim != 1 or not len(sides) or not (sides > 0.0).all():
             raise ValueError(f"Box: sides must be positive lengths [m], one for each axis, got {short(self.sides)}")
 
-    def solid(self, dim: int, device: Any) -> Solid:
+    def solid(self, dim: int, device: wp.DeviceLike) -> Solid:
         sides = np.array(self.sides, dtype=float)
         if sides.shape != (dim,):
             raise ValueError(f"Box: sides must be {dim} lengths in {dim}-D, got {self.sides}")
@@ -227,7 +227,7 @@ class Cylinder(Shape):
         positive(self.length, "Cylinder: length", "give it in m")
         unit_vector(self.axis, 3, "Cylinder: axis")
 
-    def solid(self, dim: int, device: Any) -> Solid:
+    def solid(self, dim: int, device: wp.DeviceLike) -> Solid:
         if dim != 3:
             raise ValueError(f"Cylinder: is for 3-D, got bodies in {dim}-D; its section is a Sphere or a Box there")
         r, length, axis = self.radius, self.length, unit_vector(self.axis, 3, "Cylinder: axis")

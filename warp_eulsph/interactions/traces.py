@@ -2,18 +2,19 @@
 
 The dual divergence (M5) answers a pressure on a flat face by area vectors that alternate over the layers beneath it.
 Taken as weights, ω_c = s_c·n/Σ s·n down a column, they read positions on the face itself: Σ_c s_c ⊗ x_c = V I, so that
-y = Σ_c ω_c x_c lies half a spacing outside of the outermost particle. A force on y goes to the particles by the same
+y = Σ_c ω_c x_c lies half a layer outside of the outermost particle. A force on y goes to the particles by the same
 weights: it does on them the work that it does on y, and it has the moment of a force that acts at y.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..boundaries import Assembly
-from ..boundaries.face import surfaces_held
+from ..boundaries.face import SMOOTH, surfaces_held
 from ..boundaries.named_surface import flat_faces
-from ..boundaries.outermost import Surface, nearest, surface_particles
+from ..boundaries.outermost import Surface, nearest, pairs, surface_particles
+from ..structs import StateArrays
 
 # Area vectors of a column below which, and above which, they are noise of an arrangement: parts of a particle's face.
 LEAST, MOST = 0.5, 2.0
@@ -40,7 +41,7 @@ class Traces(NamedTuple):
     tops: np.ndarray
 
 
-def find_traces(assembly: Assembly, state: Any, indices: np.ndarray, flowing: np.ndarray, who: str) -> Traces:
+def find_traces(assembly: Assembly, state: StateArrays, indices: np.ndarray, flowing: np.ndarray, who: str) -> Traces:
     """The traces of all bodies of which ``indices`` hold particles, to be asked for at the start of a run.
 
     Where ``flowing``, (n,) bool by number, particles change places: there each one is a point of its own, with half a
@@ -48,9 +49,8 @@ def find_traces(assembly: Assembly, state: Any, indices: np.ndarray, flowing: np
     """
     found: list[_Rows] = []
     for own, surface, chosen in surfaces_held(assembly, state, indices, None):
-        spacing = assembly.order.by_number(assembly.particles.spacing.numpy())[own].astype(float)
         rows = _of_liquid(surface, chosen) if flowing[own].any() else _of_solid(surface, chosen, who)
-        rows.finish(surface, spacing, own[0])
+        rows.finish(surface, own[0])
         found.append(rows)
     return Traces(
         np.concatenate([[0], np.cumsum(np.concatenate([rows.counts for rows in found]))]),
@@ -72,7 +72,7 @@ class _Rows:
         """Columns of ``members`` that lie under ``tops``, with parts of the area vectors along the normals."""
         self._parts.append((tops, normals, members, columns, areas))
 
-    def finish(self, body: Surface, spacing: np.ndarray, first: int) -> None:
+    def finish(self, body: Surface, first: int) -> None:
         """Weights, and what particles alone stand for; numbers from ``first`` on."""
         counts: list[np.ndarray] = []
         lists: dict[str, list[np.ndarray]] = {name: [] for name in self.LISTED}
@@ -89,7 +89,12 @@ class _Rows:
             total = np.bincount(columns, areas, minlength=len(tops))
             weights = areas / total[columns]
             at = np.stack([np.bincount(columns, weights * row, minlength=len(tops)) for row in body.x[members].T], 1)
-            half = (0.0 if body.exact else 0.5 * spacing[tops]) - ((at - body.x[tops]) * normals).sum(axis=1)
+            half = -((at - body.x[tops]) * normals).sum(axis=1)
+            if not body.exact:
+                a, b = pairs(body.x[tops], body.x[tops], SMOOTH * body.spacing)
+                layer = np.bincount(a, body.V[tops[b]]) / np.bincount(a, total[b])  # a mean, for single areas scatter
+                half += 0.5 * layer
+                total = body.V[tops] / layer
             counts.append(np.bincount(columns, minlength=len(tops)))
             for name, values in zip(
                 self.LISTED, (members + first, weights, half, total, normals, tops + first), strict=True

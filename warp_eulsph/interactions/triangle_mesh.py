@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -58,7 +57,7 @@ class TriangleMesh(Shape):
     repair: Repair = Repair()
     distance = mesh_distance
 
-    def solid(self, dim: int, device: Any) -> Solid:
+    def solid(self, dim: int, device: wp.DeviceLike) -> Solid:
         who = f"TriangleMesh {self.file}"
         if dim != 3:
             raise ValueError(f"{who}: is for 3-D, got bodies in {dim}-D")

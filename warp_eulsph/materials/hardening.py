@@ -61,7 +61,7 @@ class LinearHardening(Hardening):
 
     @staticmethod
     @functools.cache
-    def make_yield_stress(real: type, Constants: Any) -> Any:
+    def make_yield_stress(real: type, Constants: Any) -> wp.Function:
         @wp.func
         def linear(alpha: real, rate: real, T: real, c: Constants) -> real:
             return c.y0 + c.H * alpha
@@ -96,7 +96,7 @@ class Voce(Hardening):
 
     @staticmethod
     @functools.cache
-    def make_yield_stress(real: type, Constants: Any) -> Any:
+    def make_yield_stress(real: type, Constants: Any) -> wp.Function:
         @wp.func
         def voce(alpha: real, rate: real, T: real, c: Constants) -> real:
             return c.y0 + c.Q * (real(1.0) - wp.exp(-c.b * alpha)) + c.H * alpha
@@ -132,7 +132,7 @@ class Tabulated(Hardening):
 
     @staticmethod
     @functools.cache
-    def make_yield_stress(real: type, Constants: Any) -> Any:
+    def make_yield_stress(real: type, Constants: Any) -> wp.Function:
         count = int(Constants.vars["strains"].type._length_)
 
         @wp.func
@@ -198,7 +198,7 @@ class JohnsonCook(Hardening):
 
     @staticmethod
     @functools.cache
-    def make_yield_stress(real: type, Constants: Any) -> Any:
+    def make_yield_stress(real: type, Constants: Any) -> wp.Function:
         @wp.func
         def johnson_cook(alpha: real, rate: real, T: real, c: Constants) -> real:
             hot = wp.clamp((T - c.temperature) / c.range, real(0.0), real(1.0))

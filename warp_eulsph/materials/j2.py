@@ -58,7 +58,7 @@ class J2(Isotropic):
 
 
 @functools.cache
-def in_three_dimensions(space: Space) -> Any:
+def in_three_dimensions(space: Space) -> wp.Function:
     """``wp.func`` F with the missing stretches of one, 3 × 3."""
     mat, full, real, dim = space.mat, matrix_type(3, 3, space.real), space.real, space.dim
 
@@ -74,7 +74,7 @@ def in_three_dimensions(space: Space) -> Any:
 
 
 @functools.cache
-def _return_mapping(real: type, Constants: Any, yield_stress: Any) -> Any:
+def _return_mapping(real: type, Constants: Any, yield_stress: Any) -> wp.Function:
     """``wp.func`` (q, α, T, Δt, c) -> Δ with q − 3μ Δ = y(α + Δ, Δ/Δt, T), 0 within the yield surface; NaN: not found.
 
     By regula falsi with the Illinois rule (Dowell & Jarratt 1971), which needs no slope and keeps its bracket: y may

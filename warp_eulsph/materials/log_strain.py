@@ -26,7 +26,7 @@ def _terms(real: type, first_left_out: Any) -> int:
 
 
 @functools.cache
-def deviatoric_logarithm(real: type) -> Any:
+def deviatoric_logarithm(real: type) -> wp.Function:
     """``wp.func`` dev ln b of a symmetric, positive definite b, exact to round-off; NaN for others."""
     mat, vec = matrix_type(3, 3, real), Space(3, real).vec
     terms = _terms(real, lambda k: LARGEST_OF_LOG**k / (k + 1))
@@ -61,7 +61,7 @@ def deviatoric_logarithm(real: type) -> Any:
 
 
 @functools.cache
-def exponential(real: type) -> Any:
+def exponential(real: type) -> wp.Function:
     """``wp.func`` exp(E) of a symmetric, traceless E, exact to round-off."""
     mat = matrix_type(3, 3, real)
     terms = _terms(real, lambda k: LARGEST_OF_EXP**k / math.factorial(k))

@@ -2,7 +2,7 @@
 
 import functools
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import warp as wp
 
@@ -21,7 +21,7 @@ class Weight(ABC):
     slope_cpp: ClassVar[str]
 
     @abstractmethod
-    def profile(self, real: type) -> tuple[Any, Any]:
+    def profile(self, real: type) -> tuple[wp.Function, wp.Function]:
         """The two ``wp.func`` of q in [0, support): w(q), and −w'(q)/q, which is finite at q = 0."""
 
     def __eq__(self, other: object) -> bool:

@@ -2,7 +2,6 @@
 
 import functools
 import math
-from typing import Any
 
 import warp as wp
 
@@ -16,12 +15,12 @@ class CubicSpline(Weight):
     sigma = (2.0 / 3.0, 10.0 / (7.0 * math.pi), 1.0 / math.pi)
     slope_cpp = "q < 1 ? 3 - T(2.25) * q : T(0.75) * (2 - q) * (2 - q) / q"
 
-    def profile(self, real: type) -> tuple[Any, Any]:
+    def profile(self, real: type) -> tuple[wp.Function, wp.Function]:
         return _profile(real)
 
 
 @functools.cache
-def _profile(real: type) -> tuple[Any, Any]:
+def _profile(real: type) -> tuple[wp.Function, wp.Function]:
     @wp.func
     def value(q: real) -> real:
         w = real(0.25) * (real(2.0) - q) * (real(2.0) - q) * (real(2.0) - q)

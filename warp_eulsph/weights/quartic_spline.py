@@ -2,7 +2,6 @@
 
 import functools
 import math
-from typing import Any
 
 import warp as wp
 
@@ -19,12 +18,12 @@ class QuarticSpline(Weight):
         "(T(2.5) - q, __builtin_elementwise_max(T(1.5) - q, (V)0)) / q"
     )
 
-    def profile(self, real: type) -> tuple[Any, Any]:
+    def profile(self, real: type) -> tuple[wp.Function, wp.Function]:
         return _profile(real)
 
 
 @functools.cache
-def _profile(real: type) -> tuple[Any, Any]:
+def _profile(real: type) -> tuple[wp.Function, wp.Function]:
     @wp.func
     def fourth(x: real) -> real:
         return x * x * x * x

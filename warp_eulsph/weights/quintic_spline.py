@@ -2,7 +2,6 @@
 
 import functools
 import math
-from typing import Any
 
 import warp as wp
 
@@ -19,12 +18,12 @@ class QuinticSpline(Weight):
         "((3 - q) * (3 - q), __builtin_elementwise_max(2 - q, (V)0)) / q"
     )
 
-    def profile(self, real: type) -> tuple[Any, Any]:
+    def profile(self, real: type) -> tuple[wp.Function, wp.Function]:
         return _profile(real)
 
 
 @functools.cache
-def _profile(real: type) -> tuple[Any, Any]:
+def _profile(real: type) -> tuple[wp.Function, wp.Function]:
     @wp.func
     def fifth(x: real) -> real:
         return x * x * x * x * x

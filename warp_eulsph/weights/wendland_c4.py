@@ -2,7 +2,6 @@
 
 import functools
 import math
-from typing import Any
 
 import warp as wp
 
@@ -16,12 +15,12 @@ class WendlandC4(Weight):
     sigma = (27.0 / 32.0, 9.0 / (4.0 * math.pi), 495.0 / (256.0 * math.pi))
     slope_cpp = "[](V u) { return T(14.0 / 3) * u * u * u * u * u; }(1 - T(0.5) * q) * (1 + T(2.5) * q)"
 
-    def profile(self, real: type) -> tuple[Any, Any]:
+    def profile(self, real: type) -> tuple[wp.Function, wp.Function]:
         return _profile(real)
 
 
 @functools.cache
-def _profile(real: type) -> tuple[Any, Any]:
+def _profile(real: type) -> tuple[wp.Function, wp.Function]:
     @wp.func
     def value(q: real) -> real:
         u = real(1.0) - real(0.5) * q

@@ -2,7 +2,6 @@
 
 import functools
 import math
-from typing import Any
 
 import warp as wp
 
@@ -16,12 +15,12 @@ class WendlandC6(Weight):
     sigma = (15.0 / 16.0, 39.0 / (14.0 * math.pi), 1365.0 / (512.0 * math.pi))
     slope_cpp = "[](V u) { V c = u * u * u; return T(5.5) * c * c * u; }(1 - T(0.5) * q) * (1 + q * (T(3.5) + 4 * q))"
 
-    def profile(self, real: type) -> tuple[Any, Any]:
+    def profile(self, real: type) -> tuple[wp.Function, wp.Function]:
         return _profile(real)
 
 
 @functools.cache
-def _profile(real: type) -> tuple[Any, Any]:
+def _profile(real: type) -> tuple[wp.Function, wp.Function]:
     @wp.func
     def value(q: real) -> real:
         u = real(1.0) - real(0.5) * q

@@ -1,0 +1,92 @@
+"""Contact at work: restart, threads, searches, which bodies touch, and what is refused."""
+
+import numpy as np
+import pytest
+from touching import SOFT, bar, bits, mean_velocity, rectangle, rings
+
+import warp_eulsph as es
+from warp_eulsph import execution
+
+
+@pytest.mark.parametrize("scheme", [es.Verlet(), es.LaxWendroff()], ids=["Verlet", "LaxWendroff"])
+@pytest.mark.parametrize("arrangement", [es.Convected(), es.Current()], ids=["fixed", "moving"])
+def test_resumed_runs_go_on_bit_for_bit(scheme, arrangement):
+    """With friction and while they slide; a look at the energy in between changes nothing."""
+
+    def build():
+        simulation = rings(0.15, scheme=scheme, arrangement=arrangement)
+        return es.Simulation(
+            simulation.bodies, interactions=[es.Contact(friction=0.4)], scheme=scheme, arrangement=arrangement
+        )
+
+    whole, resumed = build(), build()
+    steps = 90 if isinstance(scheme, es.Verlet) else 220
+    whole.step(steps)
+    assert whole.energy()["held"] > 0.0
+    arrays, counters = {name: array.numpy().copy() for name, array in whole.evolving().items()}, whole.counters
+    resumed.step(4)
+    resumed.restore(arrays, counters)
+    whole.step(15)
+    resumed.step(7)
+    resumed.energy()
+    resumed.step(8)
+    assert bits(resumed) == bits(whole)
+    assert np.abs(whole.bound_interactions[0].slip.numpy()).max() > 0.0
+
+
+@pytest.mark.of_the_cpu
+def test_the_same_bits_on_any_number_of_threads():
+    found = []
+    for threads in (1, 3):
+        execution.set_threads(threads)
+        h = 0.02
+        lower = es.Body(x=rectangle(100, 50, h), volume=h * h, material=SOFT, name="lower")
+        upper = es.Body(
+            x=rectangle(100, 50, h, (0.31, 1.0)), volume=h * h, material=SOFT, velocity=(1.0, -2.0), name="upper"
+        )
+        simulation = es.Simulation([lower, upper], interactions=[es.Contact(friction=0.3)])
+        simulation.step(15)
+        found.append(bits(simulation))
+    assert found[0] == found[1]
+
+
+def test_it_searches_only_when_something_has_moved():
+    simulation = rings(0.05)
+    simulation.step(100)
+    nearby = simulation.bound_interactions[0].nearby
+    assert 0 < nearby.searches < 15
+
+
+def test_only_the_named_pairs_touch(caplog):
+    """The third passes through, and somebody says so; the others are not told of."""
+    bodies = [bar(20, 0.0, 1.0, 1.0, velocity=0.3, name="a"), bar(20, 1.1, 1.0, 1.0, name="b")]
+    bodies += [bar(20, 2.1, 1.0, 1.0, velocity=-0.3, name="c")]
+    simulation = es.Simulation(bodies, interactions=[es.Contact(between=[("a", "b")])])
+    simulation.run(1.0)
+    assert "'b' and 'c' overlap or touch" in caplog.text and "'a' and 'b'" not in caplog.text
+    assert mean_velocity(simulation, "c")[0] == pytest.approx(-0.3, rel=1e-6)
+    assert np.abs(simulation.interaction_force[40:]).max() == 0.0
+
+
+def test_bad_set_ups_get_one_clear_error():
+    h = 0.1
+    one = es.Body(x=rectangle(8, 8, h), volume=h * h, material=SOFT, name="one")
+    two = es.Body(x=rectangle(8, 8, h, (0.33, 0.71)), volume=h * h, material=SOFT, name="two")
+    with pytest.raises(
+        ValueError, match=r"'one' and 'two' do: \d+ and \d+ particles, the nearest 0\.\d+ spacings apart"
+    ):
+        es.Simulation([one, two], interactions=[es.Contact()])
+    inside = es.Body(x=rectangle(2, 2, h, (0.35, 0.35)), volume=h * h, material=SOFT, name="two")
+    with pytest.raises(ValueError, match="must not lie in each other"):
+        es.Simulation([one, inside], interactions=[es.Contact()])
+    with pytest.raises(ValueError, match="two bodies that are not bonded are needed"):
+        es.Simulation([one], interactions=[es.Contact()])
+    apart = es.Body(x=rectangle(8, 8, h, (0.0, 2.0)), volume=h * h, material=SOFT, name="two")
+    with pytest.raises(ValueError, match=r"bodies must be among \['one', 'two'\], got 'tow'"):
+        es.Simulation([one, apart], interactions=[es.Contact(between=[("one", "tow")])])
+    with pytest.raises(ValueError, match="between must be pairs of names"):
+        es.Contact(between=["one", "two"])
+    with pytest.raises(ValueError, match="friction must be 0 or more"):
+        es.Contact(friction=-0.1)
+    with pytest.raises(ValueError, match="periodic boxes"):
+        es.Simulation([one, apart], interactions=[es.Contact()], periodic=[4.0, 4.0])

@@ -1,0 +1,236 @@
+"""Sums over surfaces: their weight, which particles are outermost, the face of each, and how flat it lies."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..boundaries.outermost import BLOCKING, HEIGHT, LEAST_HEIGHT
+from ..fields import neighbour_structure, structure
+from ..linalg import symmetric_eigen
+from ..space import Space, difference
+from ..weights import CubicSpline
+
+# Smoothing length over spacing of sums over a surface, a spline of one dimension less: on a row of particles they are
+# even to 0.3 %, wherever they are taken.
+REACH = 1.2
+# Cosine between the ways out of two particles of one face: 60°, so that a corner is of the faces that meet there, and
+# these are not of each other.
+ALIKE = 0.5
+# Second moment of the particles of a face, in spacings², below which they say nothing of a plane.
+SPREAD = 1.0e-6
+
+
+@functools.cache
+def surface_weight(space: Space) -> tuple[Any, Any]:
+    """``wp.func`` φ(r, h) and −φ'(r, h)/r of the cubic spline of dimension d − 1 [1/m^(d−1)]; 1 and 0 in 1-D."""
+    real, dim = space.real, space.dim
+    value_of, slope_of = CubicSpline().profile(real)
+    sigma = CubicSpline.sigma[max(dim - 2, 0)]
+
+    if dim == 1:
+
+        @wp.func
+        def one(r: real, h: real) -> real:
+            return real(1.0)
+
+        @wp.func
+        def zero(r: real, h: real) -> real:
+            return real(0.0)
+
+        return one, zero
+
+    @wp.func
+    def scale(h: real) -> real:
+        if wp.static(dim == 2):
+            return real(sigma) / h
+        return real(sigma) / (h * h)
+
+    @wp.func
+    def value(r: real, h: real) -> real:
+        q = r / h
+        if q >= real(2.0):
+            return real(0.0)
+        return scale(h) * value_of(q)
+
+    @wp.func
+    def slope(r: real, h: real) -> real:
+        q = r / h
+        if q >= real(2.0):
+            return real(0.0)
+        return scale(h) / (h * h) * slope_of(q)
+
+    return value, slope
+
+
+@functools.cache
+def alike_vectors(space: Space) -> Any:
+    """``wp.func`` whether two area vectors may be those of one face."""
+    real, vec = space.real, space.vec
+
+    @wp.func
+    def alike(s: vec, other: vec) -> bool:
+        return wp.dot(s, other) > real(ALIKE) * wp.length(s) * wp.length(other)
+
+    return alike
+
+
+@functools.cache
+def least_two(space: Space) -> Any:
+    """``wp.func`` which eigenvalues are the least and the next to it."""
+    vec, dim = space.vec, space.dim
+
+    @wp.func
+    def find_two(values: vec):
+        least = int(0)
+        for i in range(1, wp.static(dim)):
+            if values[i] < values[least]:
+                least = i
+        next = int(0)
+        if least == 0:
+            next = wp.static(min(1, dim - 1))
+        for i in range(wp.static(dim)):
+            if i != least and values[i] < values[next]:
+                next = i
+        return least, next
+
+    return find_two
+
+
+@functools.cache
+def make_outward(space: Space) -> Any:
+    """Kernel: which way out is, −2 V_a Σ_b w_ab ξ [m^(d−1)], where the arrangement moves."""
+    vec, real, separation = space.vec, space.real, difference(space)
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_outward(first: int, reference: Reference, near: Neighbours, outward: wp.array(dtype=vec)):
+        a = first + wp.tid()
+        total = vec()
+        for k in range(near.start[a], near.start[a + 1]):
+            total -= near.w[k] * separation(reference.x[near.index[k]], reference.x[a], near.box)
+        outward[a] = total * (real(2.0) * reference.V[a])
+
+    return find_outward
+
+
+@functools.cache
+def make_find(space: Space) -> Any:
+    """Kernel: whether a particle is outermost: a large area vector, and none above it (``boundaries/outermost.py``).
+
+    Fragments without an area vector, which have hardly any neighbours, are outermost.
+    """
+    vec, real, dim, separation = space.vec, space.real, space.dim, difference(space)
+    Particles, Reference, Neighbours = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        neighbour_structure(space),
+    )
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find(
+        first: int,
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        poor: wp.array(dtype=wp.int32),
+        outward: wp.array(dtype=vec),
+        least: real,
+        outermost: wp.array(dtype=wp.int32),
+    ):
+        a = first + wp.tid()
+        size = wp.length(outward[a])
+        face = wp.pow(particles.V0[a], real(wp.static(1.0 - 1.0 / dim)))
+        found = int(size > least * face)
+        if found == 1:
+            n = outward[a] / size
+            around = int(0)
+            reach = real(0.0)
+            lean = vec()
+            for k in range(near.start[a], near.start[a + 1]):
+                away = separation(reference.x[near.index[k]], reference.x[a], near.box) / particles.spacing[a]
+                height = wp.dot(away, n)
+                if height > real(wp.static(LEAST_HEIGHT - 0.1)) and wp.length(away) < real(HEIGHT):
+                    beside = away - n * height
+                    across = wp.length(beside)
+                    if height > real(LEAST_HEIGHT) and across < real(BLOCKING):
+                        found = 0
+                    if height < real(1.6) and across < real(1.5) * height:
+                        around += 1
+                        reach += across
+                        lean += beside
+            if around > 1 and wp.length(lean) <= real(0.35) * reach:
+                found = 0
+        elif poor[a] != 0:
+            found = 1
+        if particles.share[a] == real(0.0):
+            found = 0
+        outermost[a] = found
+
+    return find
+
+
+@functools.cache
+def make_area(space: Space) -> Any:
+    """Kernel: the face of each outermost particle, 1/Σ_b φ_ab over those of its face, and how far these are from flat.
+
+    What was outermost before keeps both: energies that depend on them must not jump.
+    """
+    vec, mat, real, dim, separation = space.vec, space.mat, space.real, space.dim, difference(space)
+    weight_of, alike, eigen, order_of = (
+        surface_weight(space)[0],
+        alike_vectors(space),
+        symmetric_eigen(space),
+        least_two(space),
+    )
+    Particles, Reference, Neighbours = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        neighbour_structure(space),
+    )
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_area(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        outward: wp.array(dtype=vec),
+        outermost: wp.array(dtype=wp.int32),
+        there: wp.array(dtype=wp.int32),
+        area: wp.array(dtype=real),
+        bend: wp.array(dtype=real),
+    ):
+        k = first + wp.tid()
+        a = members[k] - offset
+        known = there[k] == 1 and outermost[a] == 1
+        there[k] = outermost[a]
+        if known:
+            return
+        h = real(REACH) * particles.spacing[a]
+        total = weight_of(real(0.0), h)
+        uneven = real(0.0)
+        if wp.static(dim > 1):
+            mean = vec()
+            square = mat()
+            for i in range(near.start[a], near.start[a + 1]):
+                b = near.index[i]
+                if outermost[b] == 1 and alike(outward[a], outward[b]):
+                    xi = separation(reference.x[b], reference.x[a], near.box)
+                    w = weight_of(wp.length(xi), h)
+                    xi = xi / particles.spacing[a]
+                    total += w
+                    mean += w * xi
+                    square += w * wp.outer(xi, xi)
+            mean = mean / total
+            _, spread = eigen(square / total - wp.outer(mean, mean))
+            least, next = order_of(spread)
+            uneven = real(1.0)
+            if spread[next] > real(SPREAD):
+                uneven = wp.clamp(spread[least] / spread[next], real(0.0), real(1.0))
+        area[k] = real(1.0) / total
+        bend[k] = uneven
+
+    return find_area

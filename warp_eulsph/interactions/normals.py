@@ -1,0 +1,161 @@
+"""Normals of surfaces, and the forces by which they answer an energy that depends on them."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from ..fields import neighbour_structure, structure
+from ..linalg import cofactor, inverse, symmetric_eigen
+from ..space import Space, difference
+from .faces import REACH, SPREAD, alike_vectors, least_two, surface_weight
+
+
+@functools.cache
+def make_normals(space: Space, fixed: bool) -> Any:
+    """Kernel: normals of the planes through the outermost particles around.
+
+    And how a normal turns with these: ``answer``, Σ_i e_i ⊗ e_i/(λ_i − λ_n) over the other eigenvectors of their second
+    moment, over their weight and spacing.
+    """
+    vec, mat, real, dim, separation = space.vec, space.mat, space.real, space.dim, difference(space)
+    weight_of, eigen, cof, invert = surface_weight(space)[0], symmetric_eigen(space), cofactor(space), inverse(space)
+    alike, order_of = alike_vectors(space), least_two(space)
+    Particles, Reference, State, Neighbours = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        structure(space, "State"),
+        neighbour_structure(space),
+    )
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_normals(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        state: State,
+        outward: wp.array(dtype=vec),
+        outermost: wp.array(dtype=wp.int32),
+        normals: wp.array(dtype=vec),
+        centres: wp.array(dtype=vec),
+        normal: wp.array(dtype=vec),
+        answer: wp.array(dtype=mat),
+    ):
+        k = first + wp.tid()
+        a = members[k] - offset
+        out = outward[a]
+        turns = mat()
+        if wp.static(fixed):
+            out = cof(state.F[a]) @ out
+        else:
+            out = cof(state.F[a] @ invert(reference.F[a])) @ out
+        n = wp.normalize(out)
+        if wp.static(dim > 1):
+            h = real(REACH) * particles.spacing[a]
+            mass = weight_of(real(0.0), h)
+            mean = vec()
+            square = mat()
+            for i in range(near.start[a], near.start[a + 1]):
+                b = near.index[i]
+                if outermost[b] == 1 and alike(outward[a], outward[b]):
+                    w = weight_of(wp.length(separation(reference.x[b], reference.x[a], near.box)), h)
+                    xi = separation(state.x[b], state.x[a], near.box) / particles.spacing[a]
+                    mass += w
+                    mean += w * xi
+                    square += w * wp.outer(xi, xi)
+            mean = mean / mass
+            axes, spread = eigen(square / mass - wp.outer(mean, mean))
+            least, next = order_of(spread)
+            if spread[next] > real(SPREAD) and wp.length(out) > real(0.0):
+                for i in range(wp.static(dim)):
+                    n[i] = axes[i, least]
+                if wp.dot(n, out) < real(0.0):
+                    n = -n
+                for i in range(wp.static(dim)):
+                    if spread[i] > spread[least]:
+                        e = vec()
+                        for j in range(wp.static(dim)):
+                            e[j] = axes[j, i]
+                        turns += wp.outer(e, e) / ((spread[i] - spread[least]) * mass * particles.spacing[a])
+            centres[a] = mean
+        normals[a] = n
+        normal[k] = n
+        answer[k] = turns
+
+    return find_normals
+
+
+@functools.cache
+def make_lever(space: Space) -> Any:
+    """Kernel: what a moment on each normal asks of the particles of its plane."""
+    vec, mat = space.vec, space.mat
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_lever(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        there: wp.array(dtype=wp.int32),
+        answer: wp.array(dtype=mat),
+        slope: wp.array(dtype=vec),
+        levers: wp.array(dtype=vec),
+    ):
+        k = first + wp.tid()
+        lever = vec()
+        if there[k] == 1:
+            lever = answer[k] @ slope[k]
+        levers[members[k] - offset] = lever
+
+    return find_lever
+
+
+@functools.cache
+def make_turn(space: Space) -> Any:
+    """Kernel: −∂E/∂n · ∂n/∂x: forces on the particles of a plane whose normal an energy depends on.
+
+    n is an eigenvector of Σ w ξ' ⊗ ξ', ξ' from their mean, so δn = Σ_i e_i (e_i·δ(Σ w ξ' ⊗ ξ') n)/(λ_n − λ_i).
+    """
+    vec, real, separation = space.vec, space.real, difference(space)
+    weight_of, alike = surface_weight(space)[0], alike_vectors(space)
+    Particles, Reference, State, Neighbours = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        structure(space, "State"),
+        neighbour_structure(space),
+    )
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def turn(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        state: State,
+        outward: wp.array(dtype=vec),
+        outermost: wp.array(dtype=wp.int32),
+        normals: wp.array(dtype=vec),
+        centres: wp.array(dtype=vec),
+        levers: wp.array(dtype=vec),
+        out: wp.array(dtype=vec),
+    ):
+        c = members[first + wp.tid()] - offset
+        force = vec()
+        if outermost[c] == 1:
+            xi = -centres[c]
+            w = weight_of(real(0.0), real(REACH) * particles.spacing[c])
+            force = w * (levers[c] * wp.dot(normals[c], xi) + normals[c] * wp.dot(levers[c], xi))
+            for i in range(near.start[c], near.start[c + 1]):
+                a = near.index[i]
+                if outermost[a] == 1 and wp.length_sq(levers[a]) > real(0.0) and alike(outward[a], outward[c]):
+                    apart = separation(reference.x[c], reference.x[a], near.box)
+                    w = weight_of(wp.length(apart), real(REACH) * particles.spacing[a])
+                    xi = separation(state.x[c], state.x[a], near.box) / particles.spacing[a] - centres[a]
+                    force += w * (levers[a] * wp.dot(normals[a], xi) + normals[a] * wp.dot(levers[a], xi))
+        out[c] = out[c] + force
+
+    return turn
