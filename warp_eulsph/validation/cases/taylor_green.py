@@ -9,6 +9,7 @@ support of 3.6 spacings does not let them pair up, and half of the dissipation (
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ..report import Figure
 
 VISCOSITY, WAVE, END = 0.01, 2.0 * np.pi, 1.0  # Pa s with ρ0 = 1 kg/m³, 1/m, s
 LIQUID = TaitLiquid(density=1.0, sound_speed=10.0, viscosity=Newtonian(viscosity=VISCOSITY))
-FLOWING = {
+FLOWING: dict[str, Any] = {
     "scheme": Verlet(dissipation=Upwind(epsilon=0.5), shifting=Shifting()),
     "weight": WendlandC2(),
     "dilation": 1.8,
