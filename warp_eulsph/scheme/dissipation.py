@@ -78,12 +78,27 @@ def blend(space: Space) -> wp.Function:
 
 
 @functools.cache
+def jump_between(space: Space, sensed: bool) -> wp.Function:
+    """``wp.func`` jump of M9 from v_b − v_a, ∇v_a + ∇v_b and ξ: reconstructed as far as d lets it where ``sensed``."""
+    real, vec, mat, mix = space.real, space.vec, space.mat, blend(space)
+
+    @wp.func
+    def jump_between(plain: vec, gradients: mat, xi: vec, epsilon: real, d_a: vec, d_b: vec) -> vec:
+        reconstructed = plain - gradients @ (xi * real(0.5))
+        if wp.static(sensed):
+            return mix(reconstructed, plain, epsilon, d_a, d_b)
+        return reconstructed * epsilon
+
+    return jump_between
+
+
+@functools.cache
 def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
     """Kernel: D_a of M9; antisymmetric in the pair."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     Neighbours = neighbour_structure(space)
-    separation, pair_force, mix = difference(space), upwind(space), blend(space)
+    separation, pair_force, jump_of = difference(space), upwind(space), jump_between(space, sensed)
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate(
@@ -109,12 +124,7 @@ def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
-            plain = v[b] - v_a
-            jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
-            if wp.static(sensed):
-                jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
-            else:
-                jump = jump * epsilon
+            jump = jump_of(v[b] - v_a, grad_a + grad_v[b], xi, epsilon, sensor[a], sensor[b])
             Z, Z_shear = Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b]
             now = separation(x[b], x[a], near.box)
             force += pair_force(xi, now, V_a * near.w[k], Z, Z_shear, jump)

@@ -11,7 +11,7 @@ from ..materials import Law
 from ..materials.base import history_row
 from ..space import Space, difference
 from ..structs import ClockArrays, ParticleArrays
-from .dissipation import blend, upwind
+from .dissipation import jump_between, upwind
 from .flux import Flux
 from .shifting import NO_BOUND
 from .stabiliser import Sums
@@ -26,7 +26,7 @@ def _make_heat(space: Space, sensed: bool) -> wp.Kernel:
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux, Clock = structure(space, "Reference"), structure(space, "Flux"), clock_structure(space)
     Neighbours = neighbour_structure(space)
-    separation, pair_force, mix = difference(space), upwind(space), blend(space)
+    separation, pair_force, jump_of = difference(space), upwind(space), jump_between(space, sensed)
 
     @wp.kernel(module="unique", enable_backward=False)
     def heat(
@@ -50,12 +50,7 @@ def _make_heat(space: Space, sensed: bool) -> wp.Kernel:
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], reference.x[a], near.box)
-            plain = v[b] - v[a]
-            jump = plain - (grad_v[a] + grad_v[b]) @ (xi * real(0.5))
-            if wp.static(sensed):
-                jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
-            else:
-                jump = jump * epsilon
+            jump = jump_of(v[b] - v[a], grad_v[a] + grad_v[b], xi, epsilon, sensor[a], sensor[b])
             Z, Z_shear = flux.impedance[a] + flux.impedance[b], flux.shear_impedance[a] + flux.shear_impedance[b]
             now = separation(x[b], x[a], near.box)
             force = pair_force(xi, now, reference.V[a] * near.w[k], Z, Z_shear, jump)

@@ -12,7 +12,7 @@ from ..operators.laplacian import LaplacianSolver
 from ..reduce import Sum
 from ..space import Space, difference
 from ..structs import ParticleArrays, StateArrays
-from .dissipation import UpwindForces, blend, upwind
+from .dissipation import UpwindForces, jump_between, upwind
 from .flux import Flux
 from .reference import Configuration
 from .stabiliser import Correction, Stabiliser, Sums
@@ -84,7 +84,8 @@ def _make_dissipate(space: Space, sensed: bool) -> wp.Kernel:
     """Kernel: M9, and from the powers of M9 and of M11 in the particle's pairs what M12 admits, R_a."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux, Neighbours = structure(space, "Reference"), structure(space, "Flux"), neighbour_structure(space)
-    separation, pair_force, mix, share = difference(space), upwind(space), blend(space), admitted(space)
+    separation, pair_force, share = difference(space), upwind(space), admitted(space)
+    jump_of = jump_between(space, sensed)
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate_and_budget(
@@ -114,11 +115,7 @@ def _make_dissipate(space: Space, sensed: bool) -> wp.Kernel:
             xi = separation(reference.x[b], x_a, near.box)
             VVg = V_a * near.w[k]
             plain = v[b] - v_a
-            jump = plain - (grad_a + grad_v[b]) @ (xi * real(0.5))
-            if wp.static(sensed):
-                jump = mix(jump, plain, epsilon, sensor[a], sensor[b])
-            else:
-                jump = jump * epsilon
+            jump = jump_of(plain, grad_a + grad_v[b], xi, epsilon, sensor[a], sensor[b])
             now = separation(x[b], x[a], near.box)
             Z, Z_shear = Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b]
             upwind_ab = pair_force(xi, now, VVg, Z, Z_shear, jump)
