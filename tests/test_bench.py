@@ -10,7 +10,7 @@ import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.bench import command, mixing, release, snapshot_cost
+from warp_eulsph.bench import command, many_runs, mixing, release, snapshot_cost
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
 from warp_eulsph.bench.phases import PHASES
@@ -147,3 +147,14 @@ def test_cost_of_mixing_is_measured(capsys):
     assert all(1e4 < found[name] < 1e8 for name in ("lattice", "left", "sorted"))
     assert found["look"] > 0.0 and found["sort"] > 0.0
     assert "M particle-steps per processor second" in capsys.readouterr().out
+
+
+def test_many_runs_together_are_timed_beside_those_one_by_one(monkeypatch, capsys):
+    for name, value in {"STEPS": 30, "ROUNDS": 1, "ALONE": 1, "TOGETHER": 10}.items():
+        monkeypatch.setattr(many_runs, name, value)
+    before = execution.threads()
+    try:
+        many_runs.main(["--bars", "3"])
+    finally:
+        execution.set_threads(before)
+    assert "3 bars of 40 particles, 30 steps each" in capsys.readouterr().out

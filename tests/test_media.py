@@ -11,7 +11,7 @@ from clouds import cloud
 import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.cases import CaseError, parse_case
-from warp_eulsph.geometry import disc
+from warp_eulsph.geometry import box, disc
 from warp_eulsph.operators.neighbours import NeighbourLists
 
 RUBBER = es.NeoHookean(density=1100.0, young=1e6, poisson=0.4)
@@ -252,3 +252,23 @@ def test_mistakes_in_options_of_bodies_are_named():
     wrong = {**CASE, "body": {"ring": {**CASE["body"]["ring"], "reference": "Nevr"}}}
     with pytest.raises(CaseError, match=r"body.ring.reference: unknown kind 'Nevr'; did you mean 'Never'"):
         parse_case(wrong)
+
+
+@pytest.mark.parametrize("equal", [True, False], ids=["of one material", "of many"])
+def test_many_bodies_of_one_kind_of_law_move_as_each_would_alone(equal):
+    """In every bit, at equal steps; their laws are evaluated in one launch, each with its own constants."""
+    step = es.TimeStep(fixed=1e-4)
+
+    def bar(k):
+        x, volume = box((2.0 * k,), (2.0 * k + 1.0,), 0.05)
+        material = es.NeoHookean(density=1100.0, young=1e6 if equal else 1e6 * (k + 1), poisson=0.3)
+        return es.Body(x=x, volume=volume, material=material, velocity=np.sin(3.0 * (x - 2.0 * k)), name=f"bar {k}")
+
+    bars = [bar(k) for k in range(5)]
+    together = es.Simulation(bars, time_step=step)
+    assert len(together.stepper.media) == len(together.stepper.flux.kinds) == 1
+    together.step(40)
+    for body in bars:
+        alone = es.Simulation(body, time_step=step)
+        alone.step(40)
+        assert all(np.array_equal(state(together, body.name)[f], v) for f, v in state(alone, body.name).items())

@@ -4,7 +4,7 @@ import logging
 import math
 import time
 from collections.abc import Collection, Sequence
-from itertools import combinations, pairwise, product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -50,10 +50,12 @@ class Encounters:
         self._matter = [(numbers, spacing[numbers]) for numbers in matter]
         self._box = np.array(box, dtype=float)
         self._shifts = np.array(list(product(*[(-length, 0.0, length) if length > 0.0 else (0.0,) for length in box])))
-        groups, pairs = groups_of(bodies), combinations(range(len(bodies)), 2)
-        self._left = [(i, j) for i, j in pairs if groups[i] != groups[j] and len(matter[i]) and len(matter[j])]
-        felt = {frozenset(two) for two in touching}
-        self._left = [(i, j) for i, j in self._left if frozenset((self.names[i], self.names[j])) not in felt]
+        there, group = np.array([len(numbers) > 0 for numbers in matter]), np.array(groups_of(bodies))
+        pairs = np.stack(np.triu_indices(len(bodies), 1), axis=1)
+        self._left = pairs[(group[pairs[:, 0]] != group[pairs[:, 1]]) & there[pairs].all(axis=1)]
+        for two in touching:
+            felt = np.isin(self._left, [k for k, name in enumerate(self.names) if name in two]).all(axis=1)
+            self._left = self._left[~felt]
         self._looked, self._due, self._rest = 0, 0.0, 0.0  # step, time [s], the clock on the wall [s]
 
     def look(self, x: np.ndarray, t: float, step: int, speed: float = math.inf) -> list[str]:
@@ -65,44 +67,53 @@ class Encounters:
         places = [x[numbers] for numbers, _ in self._matter]
         spacing = [spacing for _, spacing in self._matter]
         when = f" by t = {t:.6g} s, step {step}" if step else ""
-        lines, gap, start = [], math.inf, time.perf_counter()
-        for i, j in list(self._left):
-            apart = _gap(places[i], places[j], self._shifts) - TOUCHING * max(spacing[i].max(), spacing[j].max())
-            gap = min(gap, max(apart, 0.0))
-            if apart > 0.0 or start < self._rest:
-                continue
+        lines, told, start = [], [], time.perf_counter()
+        apart = self._apart(places)
+        gap = max(float(apart.min(initial=math.inf)), 0.0)
+        for k in np.flatnonzero(apart <= 0.0) if start >= self._rest else ():
+            i, j = self._left[k]
             one, other = (places[i], spacing[i]), (places[j], spacing[j])
             within = [_near(*one, *other, self._shifts), _near(*other, *one, -self._shifts)]
             if any(near.any() for near in within):
-                self._left.remove((i, j))
+                told.append(k)
                 names = [f"{near.sum()} particles of {self.names[k]!r}" for k, near in zip((i, j), within, strict=True)]
                 lines.append(
                     f"bodies {self.names[i]!r} and {self.names[j]!r} overlap or touch{when}: {' and '.join(names)} lie "
                     f"within {TOUCHING} spacings of one of the other; bodies do not feel each other, they pass through,"
                     " unless bonded=... makes them one or an interaction acts between them"
                 )
+        self._left = np.delete(self._left, told, axis=0)
         if gap == 0.0 and start >= self._rest:
             end = time.perf_counter()
             self._rest = end + (end - start) / SHARE
         self._looked, self._due = step, t + 0.25 * gap / max(speed, 1e-300)
         return lines
 
+    def _apart(self, places: Sequence[np.ndarray]) -> np.ndarray:
+        """How far the boxes around each two bodies left, or their nearest images, are from touching [m], (k,).
+
+        Along the axis where that is most.
+        """
+        first, second = self._left.T
+        low, high = (
+            np.array([end(x, axis=0) if len(x) else x.sum(axis=0) for x in places]) for end in (np.min, np.max)
+        )
+        reach = TOUCHING * np.array([spacing.max() if len(spacing) else 0.0 for _, spacing in self._matter])
+        apart = np.full(len(self._left), math.inf)
+        for shift in self._shifts:
+            across = np.maximum(low[second] + shift - high[first], low[first] - high[second] - shift).max(axis=1)
+            apart = np.minimum(apart, across)
+        return apart - np.maximum(reach[first], reach[second])
+
     def look_now_and_then(self, simulation: Any) -> None:
         """Log what ``look`` finds, if it is time for it."""
-        if not self._left or simulation.steps < self._looked + LEAST:
+        if not len(self._left) or simulation.steps < self._looked + LEAST:
             return
         if simulation.t < self._due and simulation.steps < self._looked + MOST:
             return
         speed = simulation.diagnostics.extrema(simulation.stepper.U)[2]
         for line in self.look(simulation.x, simulation.t, simulation.steps, speed):
             log.warning("%s", line)
-
-
-def _gap(x: np.ndarray, y: np.ndarray, shifts: np.ndarray) -> float:
-    """The largest distance along an axis between the boxes around x and y, or the nearest image of y."""
-    (low, high), (lower, upper) = ((places.min(axis=0), places.max(axis=0)) for places in (x, y))
-    apart = np.maximum(lower + shifts - high, low - upper - shifts).max(axis=1)
-    return float(apart.min())
 
 
 def _near(x: np.ndarray, spacing: np.ndarray, y: np.ndarray, other: np.ndarray, shifts: np.ndarray) -> np.ndarray:

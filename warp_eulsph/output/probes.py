@@ -15,7 +15,7 @@ from ..building import options_of
 from ..diagnostics import BodySums, SectionForce
 from ..interactions import BoundRigidBody
 from ..schedule import EverySteps, Schedule
-from ..scheme.flux import Part
+from ..scheme.laws import Part
 from .recorded import RecordedSolids
 from .shape_functions import shape_functions
 from .stress import body_stress, stresses

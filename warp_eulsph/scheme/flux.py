@@ -2,9 +2,7 @@
 
 import functools
 from collections.abc import Sequence
-from typing import Any, NamedTuple
 
-import numpy as np
 import warp as wp
 
 from ..atomics import lower_to, raise_to
@@ -15,6 +13,7 @@ from ..materials import Law, Material
 from ..materials.base import history_row, long_form
 from ..space import Space
 from ..structs import ClockArrays, FluxArrays, ParticleArrays
+from .laws import constants_of_body, kinds_of, laws_structure
 from .policy import Always, Every, ReferencePolicy
 from .reference import Configuration, resolution
 
@@ -34,11 +33,12 @@ def velocity_gradient(space: Space, fixed: bool) -> wp.Function:
 
 
 @functools.cache
-def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> wp.Kernel:
+def _make_flux(space: Space, law: Law, several: bool, fixed: bool, dual: bool) -> wp.Kernel:
     mat, real, determinant = space.mat, space.real, det(space)
     Reference, Flux, Clock = structure(space, "Reference"), structure(space, "Flux"), clock_structure(space)
-    Constants, row, remembers = law.Constants, history_row(space, law), bool(law.history)
+    Laws, row, remembers = laws_structure(law), history_row(space, law), bool(law.history)
     P_of, rate_of = long_form(space, law).stress, velocity_gradient(space, fixed)
+    Particles, constants_of = structure(space, "Particles"), constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def compute_flux(
@@ -47,13 +47,15 @@ def _make_flux(space: Space, law: Law, fixed: bool, dual: bool) -> wp.Kernel:
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
         history: wp.array(dtype=row),
+        particles: Particles,
         reference: Reference,
         clock: Clock,
         fraction: wp.float64,
-        c: Constants,
+        laws: Laws,
         flux: Flux,
     ):
         a = first + wp.tid()
+        c = constants_of(a, particles, laws)
         rate = mat()
         h = row()
         ahead = real(0.0)
@@ -93,14 +95,15 @@ STRAIN = 0.25
 
 
 @functools.cache
-def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> wp.Kernel:
+def _make_wave_speeds(space: Space, law: Law, several: bool, fixed: bool) -> wp.Kernel:
     real, mat = space.real, space.mat
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
-    Clock, Constants, dim = clock_structure(space), law.Constants, float(space.dim)
+    Clock, Laws, dim = clock_structure(space), laws_structure(law), float(space.dim)
     row, remembers, moduli = history_row(space, law), bool(law.history), long_form(space, law).wave_moduli
     drag_of, viscous, rate_of = law.viscosity, law.viscosity is not None, velocity_gradient(space, fixed)
     invert, shortening_of = inverse(space), largest_shortening(space)
     raise_rate, resolution_of, with_viscosity = raise_to(real), resolution(space), rate_with_viscosity(real)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
@@ -111,11 +114,12 @@ def _make_wave_speeds(space: Space, law: Law, fixed: bool) -> wp.Kernel:
         history: wp.array(dtype=row),
         particles: Particles,
         reference: Reference,
-        c: Constants,
+        laws: Laws,
         flux: Flux,
         clock: Clock,
     ):
         a = first + wp.tid()
+        c = constants_of(a, particles, laws)
         # A wave of speed c runs at c |G⁻¹| when distances are measured in the reference, G = F F_k⁻¹.
         G = F[a]
         if wp.static(not fixed):
@@ -165,9 +169,10 @@ def _make_moduli(space: Space, law: Law) -> wp.Kernel:
 
 
 @functools.cache
-def _make_energy(space: Space, law: Law) -> wp.Kernel:
+def _make_energy(space: Space, law: Law, several: bool) -> wp.Kernel:
     mat, row, remembers = space.mat, history_row(space, law), bool(law.history)
-    Particles, Constants, density = structure(space, "Particles"), law.Constants, long_form(space, law).energy
+    Particles, Laws, density = structure(space, "Particles"), laws_structure(law), long_form(space, law).energy
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def energy(
@@ -176,10 +181,11 @@ def _make_energy(space: Space, law: Law) -> wp.Kernel:
         F: wp.array(dtype=mat),
         history: wp.array(dtype=row),
         particles: Particles,
-        c: Constants,
+        laws: Laws,
         out: wp.array(dtype=wp.float64),
     ):
         a = first + wp.tid()
+        c = constants_of(a, particles, laws)
         h = row()
         if wp.static(remembers):
             h = history[a - begin]
@@ -189,20 +195,22 @@ def _make_energy(space: Space, law: Law) -> wp.Kernel:
 
 
 @functools.cache
-def _make_forget(space: Space, law: Law) -> wp.Kernel:
+def _make_forget(space: Space, law: Law, several: bool) -> wp.Kernel:
     """Kernel: what a law without a history leaves of F after a full step."""
-    mat, Constants, kept = space.mat, law.Constants, law.update
+    mat, Laws, kept = space.mat, laws_structure(law), law.update
+    Particles, constants_of = structure(space, "Particles"), constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def forget(first: int, F: wp.array(dtype=mat), c: Constants):
+    def forget(first: int, F: wp.array(dtype=mat), particles: Particles, laws: Laws):
         a = first + wp.tid()
+        c = constants_of(a, particles, laws)
         F[a] = kept(F[a], c)
 
     return forget
 
 
 @functools.cache
-def _make_update(space: Space, law: Law, fixed: bool, tied: bool) -> wp.Kernel:
+def _make_update(space: Space, law: Law, several: bool, fixed: bool, tied: bool) -> wp.Kernel:
     """Kernel: the history after a full step and the energy that it dissipated; a step of length zero changes nothing.
 
     A particle whose history is not finite is bad: its law found no state. Where the law yields and is ``tied``, so does
@@ -210,8 +218,9 @@ def _make_update(space: Space, law: Law, fixed: bool, tied: bool) -> wp.Kernel:
     """
     real, mat, row, length = space.real, space.mat, history_row(space, law), len(law.start)
     Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
-    Flux, Constants, updated = structure(space, "Flux"), law.Constants, law.update
+    Flux, Laws, updated = structure(space, "Flux"), laws_structure(law), law.update
     rate_of, secant_of = velocity_gradient(space, fixed), law.secant
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def update(
@@ -223,10 +232,11 @@ def _make_update(space: Space, law: Law, fixed: bool, tied: bool) -> wp.Kernel:
         particles: Particles,
         reference: Reference,
         clock: Clock,
-        c: Constants,
+        laws: Laws,
         flux: Flux,
     ):
         a = first + wp.tid()
+        c = constants_of(a, particles, laws)
         flux.dissipated[a] = real(0.0)
         if wp.static(tied):
             flux.slipped[a] = real(0.0)
@@ -251,31 +261,27 @@ def _make_update(space: Space, law: Law, fixed: bool, tied: bool) -> wp.Kernel:
 
 
 @functools.cache
-def _make_rebase(space: Space, law: Law) -> wp.Kernel:
+def _make_rebase(space: Space, law: Law, several: bool) -> wp.Kernel:
     """Kernel: F and history as a new reference takes them."""
-    mat, row, Constants, rebased = space.mat, history_row(space, law), law.Constants, law.rebase
+    mat, row, Laws, rebased = space.mat, history_row(space, law), laws_structure(law), law.rebase
+    Particles, constants_of = structure(space, "Particles"), constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def rebase(first: int, begin: int, F: wp.array(dtype=mat), history: wp.array(dtype=row), c: Constants):
+    def rebase(
+        first: int,
+        begin: int,
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        particles: Particles,
+        laws: Laws,
+    ):
         a = first + wp.tid()
+        c = constants_of(a, particles, laws)
         F_a, h = rebased(F[a], history[a - begin], c)
         F[a] = F_a
         history[a - begin] = h
 
     return rebase
-
-
-class Part(NamedTuple):
-    """One body: its first particle, how many it has, its law, and what the law's particles remember.
-
-    ``history`` has one row per particle; it is empty where the law remembers nothing.
-    """
-
-    first: int
-    size: int
-    law: Law
-    constants: Any
-    history: wp.array
 
 
 def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> None:
@@ -293,13 +299,13 @@ def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> N
 
 
 class Flux:
-    """Stress, wave speeds, stored energy and histories of all bodies; one launch per body and quantity.
+    """Stress, wave speeds, stored energy and histories of all bodies; a launch per kind of law and quantity.
 
     Args:
         bodies: (material, number of particles) in the order of the particle arrays.
 
     Attributes:
-        parts: the bodies with their laws and histories.
+        kinds: the bodies by kinds of law, in their order. parts: the bodies with their laws and histories.
         bodies: particle indices of each body.
         forgets: every body carries J alone.
     """
@@ -309,18 +315,12 @@ class Flux:
     ):
         self.space, self.particles, self.device = space, particles, device
         self._launch = Launcher(device)
-        self.parts: list[Part] = []
-        first = 0
-        for material, count in bodies:
-            law = material.law(space)
-            history = wp.zeros(count if law.history else 0, dtype=history_row(space, law), device=device)
-            if law.history:
-                history.assign(np.broadcast_to(law.start, (count, len(law.start))))
-            self.parts.append(Part(first, count, law, material.filled_constants(law), history))
-            first += count
+        self.kinds = kinds_of(space, bodies, int(particles.body.numpy()[0]), device)
+        self.parts = [part for kind in self.kinds for part in kind.parts]
+        n = sum(part.size for part in self.parts)
         remembers = any(part.law.history for part in self.parts)
         empty = ["Pi", "tie", "drag", "secant", "tied", "slipped"] + ([] if remembers else ["dissipated"])
-        self.fields: FluxArrays = allocate(space, "Flux", first, device, empty=empty)
+        self.fields: FluxArrays = allocate(space, "Flux", n, device, empty=empty)
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
         self.forgets = all(material.forgets for material, _ in bodies)
 
@@ -358,38 +358,41 @@ class Flux:
 
         F is ``fraction`` Δt ahead of the histories, moved by ``grad_v`` = ∇_k v.
         """
-        for part in self.parts:
-            arguments = [part.first, F, grad_v, part.history, configuration.fields, clock, fraction]
-            kernel = _make_flux(self.space, part.law, configuration.fixed, len(self.fields.Pi) > 0)
-            self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
+        dual = len(self.fields.Pi) > 0
+        for kind in self.kinds:
+            arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields, clock, fraction]
+            kernel = _make_flux(self.space, kind.law, kind.several, configuration.fixed, dual)
+            self._launch(kernel, kind.size, [*arguments, kind.laws, self.fields], kind.first)
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
-        for part in self.parts:
-            arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields]
-            kernel = _make_wave_speeds(self.space, part.law, configuration.fixed)
-            self._launch(kernel, part.size, [*arguments, part.constants, self.fields, clock], part.first)
+        for kind in self.kinds:
+            arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields]
+            kernel = _make_wave_speeds(self.space, kind.law, kind.several, configuration.fixed)
+            self._launch(kernel, kind.size, [*arguments, kind.laws, self.fields, clock], kind.first)
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""
-        for part in self.parts:
-            arguments = [part.first, F, part.history, self.particles, part.constants, out]
-            self._launch(_make_energy(self.space, part.law), part.size, arguments, part.first)
+        for kind in self.kinds:
+            arguments = [kind.first, F, kind.history, self.particles, kind.laws, out]
+            self._launch(_make_energy(self.space, kind.law, kind.several), kind.size, arguments, kind.first)
 
     def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """After a full step that ``grad_v`` = ∇_k v made: what each law keeps of F, its history, what it dissipated."""
-        for part in self.parts:
-            if part.law.history and part.law.update is not None:
-                arguments = [part.first, F, grad_v, part.history, self.particles, configuration.fields, clock]
-                tied = part.law.secant is not None and len(self.fields.slipped) > 0
-                kernel = _make_update(self.space, part.law, configuration.fixed, tied)
-                self._launch(kernel, part.size, [*arguments, part.constants, self.fields], part.first)
-            elif part.law.update is not None:
-                self._launch(_make_forget(self.space, part.law), part.size, [F, part.constants], part.first)
+        for kind in self.kinds:
+            law = kind.law
+            if law.history and law.update is not None:
+                arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields, clock]
+                tied = law.secant is not None and len(self.fields.slipped) > 0
+                kernel = _make_update(self.space, law, kind.several, configuration.fixed, tied)
+                self._launch(kernel, kind.size, [*arguments, kind.laws, self.fields], kind.first)
+            elif law.update is not None:
+                kernel = _make_forget(self.space, law, kind.several)
+                self._launch(kernel, kind.size, [F, self.particles, kind.laws], kind.first)
 
     def rebase(self, F: wp.array) -> None:
         """Before a refresh: F and histories as the new reference takes them."""
-        for part in self.parts:
-            if part.law.rebase is not None:
-                arguments = [part.first, F, part.history, part.constants]
-                self._launch(_make_rebase(self.space, part.law), part.size, arguments, part.first)
+        for kind in self.kinds:
+            if kind.law.rebase is not None:
+                arguments = [kind.first, F, kind.history, self.particles, kind.laws]
+                self._launch(_make_rebase(self.space, kind.law, kind.several), kind.size, arguments, kind.first)

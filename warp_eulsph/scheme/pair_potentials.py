@@ -79,6 +79,7 @@ def _make_simd(space: Space, damped: bool, stressed: bool, dual: bool, yielding:
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces, invert = structure(space, "Flux"), structure(space, "Forces"), inverse(space)
+    Particles = structure(space, "Particles")
     between = "now" if stressed else "xi"  # what ∇v is of
     # what positions are off turns with the pair: no drag on rotation
     turning = "" if stressed or space.dim == 1 else TURNING[space.dim]
@@ -186,7 +187,8 @@ def _make_simd(space: Space, damped: bool, stressed: bool, dual: bool, yielding:
         near: Neighbours,
         rows: wp.array2d(dtype=real),
         F: wp.array(dtype=mat),
-        modulus: real,
+        particles: Particles,
+        moduli: wp.array(dtype=real),
         epsilon: real,
         flux: Flux,
         forces: Forces,
@@ -204,7 +206,7 @@ def _make_simd(space: Space, damped: bool, stressed: bool, dual: bool, yielding:
             own,
             box,
             rows,
-            modulus,
+            moduli[particles.body[a] - particles.body[0]],
             flux.secant[a],
             epsilon,
             V_a,
@@ -248,7 +250,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
     """
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    Flux, Forces = structure(space, "Flux"), structure(space, "Forces")
+    Flux, Forces, Particles = structure(space, "Flux"), structure(space, "Forces"), structure(space, "Particles")
     separation, pair_force, mix, invert = difference(space), upwind(space), blend(space), inverse(space)
     spin_of, turned = make_spin(space), make_turned(space)
 
@@ -263,15 +265,15 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
         grad_v: wp.array(dtype=mat),
         D: wp.array(dtype=mat),
         sensor: wp.array(dtype=vec),
-        modulus: real,
+        particles: Particles,
+        moduli: wp.array(dtype=real),
         epsilon: real,
         flux: Flux,
         forces: Forces,
     ):
         a = first + wp.tid()
-        tie, drag = vec(), vec()
-        tied, dragged = mat(), mat()
-        held = real(0.0)
+        tie, drag, tied, dragged = vec(), vec(), mat(), mat()
+        held, modulus = real(0.0), moduli[particles.body[a] - particles.body[0]]
         for k in range(near.start[a], near.start[a + 1]):
             b = near.index[k]
             xi = separation(reference.x[b], reference.x[a], near.box)
@@ -348,10 +350,13 @@ class PairPotentials:
         self._stressed = dissipation is not None and dissipation.stress
         n = len(flux.fields.Q)
         moduli = [tie.modulus(M, mu, space.dim) if tie is not None else 0.0 for M, mu in flux.moduli()]
-        softest = [min(M for M, other in zip(moduli, groups, strict=True) if other == group) for group in groups]
-        self._bodies = list(zip(flux.bodies, softest, strict=True))
+        softest: dict[int, float] = {}
+        for M, group in zip(moduli, groups, strict=True):
+            softest[group] = min(M, softest.get(group, M))
+        self._moduli = wp.array([softest[group] for group in groups], dtype=space.real, device=device)
         self._rows = packed_rows(space, n if simd else 0, _vectors(space, damped), device)
         self._D = wp.zeros(n if damped and not simd else 0, dtype=space.mat, device=device)
+        self._particles = flux.particles
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
         self._one = wp.ones(1, dtype=space.real, device=device)
         flux.fields.secant = repeated(self._one, n)
@@ -371,14 +376,12 @@ class PairPotentials:
             arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
             self._launch(_make_pack(self.space, damped, stressed), len(v), arguments)
             kernel = _make_simd(self.space, damped, stressed, dual, self._yielding)
-            for body, modulus in self._bodies:
-                arguments = [reference, near, self._rows, state.F, modulus, epsilon, flux, forces]
-                self._launch(kernel, len(body), arguments, body.start)
+            arguments = [reference, near, self._rows, state.F, self._particles, self._moduli, epsilon, flux, forces]
+            self._launch(kernel, len(v), arguments)
             return
         if damped:
             self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
         kernel = _make_portable(self.space, damped, stressed, sums.sensor is not None, dual, self._yielding)
         sensor = v if sums.sensor is None else sums.sensor
-        for body, modulus in self._bodies:
-            arguments = [reference, near, state.x, state.F, v, grad_v, self._D, sensor]
-            self._launch(kernel, len(body), [*arguments, modulus, epsilon, flux, forces], body.start)
+        arguments = [reference, near, state.x, state.F, v, grad_v, self._D, sensor, self._particles, self._moduli]
+        self._launch(kernel, len(v), [*arguments, epsilon, flux, forces])

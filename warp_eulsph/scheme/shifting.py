@@ -12,8 +12,9 @@ from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
 from ..structs import ClockArrays, ParticleArrays, StateArrays
-from .flux import Flux, Part
+from .flux import Flux
 from .health import WELL
+from .laws import Part
 from .projection import Projection, pad
 from .reference import Configuration
 

@@ -15,7 +15,8 @@ from ..operators.neighbours import NeighbourLists
 from ..space import Space
 from ..structs import ForceArrays, ParticleArrays, StateArrays
 from .exchanges import Exchange, Exchanges
-from .flux import Flux, Part
+from .flux import Flux
+from .laws import Part
 from .ledger import Ledger
 from .medium import Medium, MediumParts
 from .reference import Configuration
