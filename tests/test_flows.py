@@ -178,6 +178,17 @@ def test_standing_sound_wave_is_of_second_order(material, dim):
     assert (np.log2(np.divide(*errors)) > 1.9).all() and max(errors[1]) < 0.015
 
 
+def test_compression_beyond_the_equation_of_state_stops_the_run():
+    """Copper has no state at J ≤ 1 − 1/s = 0.328: the particle that gets there is named."""
+    x = (np.arange(20) + 0.5) / 20
+    simulation = es.Simulation(es.Body(x=x[:, None], volume=0.05, material=COPPER))
+    F = simulation.stepper.U.F.numpy().copy()
+    F[7] = 0.32
+    simulation.stepper.U.F.assign(F)
+    with pytest.raises(es.UnstableError, match=r"particle \d+ of body 'body' at x = .*(non-finite|no state)"):
+        simulation.step(2)
+
+
 # viscosity
 
 NU = 1.0
