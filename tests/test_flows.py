@@ -312,7 +312,7 @@ def test_hydrostatic_pressure_stays(jitter):
 
 @pytest.mark.parametrize("material", [OIL, GAS], ids=["tait", "gas"])
 def test_volume_that_flows_keeps_the_whole_and_the_books(material):
-    """In a noisy periodic field: Σ V₀ J changes as without it, M23 only takes energy, and a gas takes that as heat."""
+    """In a noisy periodic field: Σ V₀ J changes as without it, M24 only takes energy, and a gas takes that as heat."""
     x = lattice(2, 8)
     noise = (
         0.02 * np.sqrt(long_law(GAS)(np.ones((1, 1, 1)))[3][0, 0] / 1.2) * np.random.default_rng(3).normal(size=x.shape)

@@ -21,6 +21,7 @@ from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
+from .sharpening import Sharpener
 from .shifting import Shifter
 from .stabiliser import Stabiliser, Sums
 from .updates import make_drift, make_kick, make_mean, make_predict
@@ -75,7 +76,7 @@ class Medium:
 
     Attributes:
         surface_given: the bodies came with their area vectors.
-        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
+        stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
         heating: None where no law takes heat. volumes: None where no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
@@ -97,7 +98,12 @@ class Medium:
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
-        self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
+        self.sharpener: Sharpener | None = None
+        if self.configuration.sharpened:
+            self.sharpener = Sharpener(space, self.configuration, n, device)
+        self.stabiliser: Stabiliser = UpwindForces(space, device)
+        if plain:
+            self.stabiliser = DualForces(space, n, self.sharpener, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
             _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
             self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
@@ -181,12 +187,15 @@ class Medium:
     def find_surface(self, state: StateArrays) -> None:
         """s_a = e_a at the start (M10)."""
         nothing_yet = self.forces.free_v
-        self.configuration.defect(nothing_yet, self.of(state).surface)
+        unit = None if self.sharpener is None else self.sharpener.unit()
+        self.configuration.defect(nothing_yet, self.of(state).surface, unit)
 
     def look_outward(self, state: StateArrays) -> None:
-        """Which way out is: by the area vectors, unless weights are tilted."""
-        if self.configuration.tilt is None:
+        """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""
+        if self.configuration.tilt is None and self.sharpener is None:
             wp.copy(self.particles.outward, self.of(state).surface)
+        elif self.configuration.tilt is None:
+            self.configuration.defect(self.forces.free_v, self.particles.outward)
 
     def move(self, state: StateArrays) -> None:
         """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
@@ -227,8 +236,9 @@ class Medium:
     # the lines of a step
 
     def velocity_gradient(self, state: StateArrays, out: wp.array | None = None) -> None:
-        """∇_k v (M4), into ``grad_v`` by default."""
-        self.configuration.gradient(self.of(state).v, self.grad_v if out is None else out)
+        """∇_k v (M4, M23), into ``grad_v`` by default."""
+        gradient = self.configuration.gradient if self.sharpener is None else self.sharpener.gradient
+        gradient(self.of(state).v, self.grad_v if out is None else out)
 
     def keep_gradient(self, state: StateArrays) -> None:
         """∇_k v of a state in which a step begins, where it is kept."""
@@ -328,7 +338,7 @@ class Medium:
             self.heating.take(self.of(state).F, self.clock)
 
     def find_exchange(self) -> None:
-        """What volume flows between pairs (M23)."""
+        """What volume flows between pairs (M24)."""
         if self.volumes is not None:
             self.volumes.find(self.sums, self.clock)
 

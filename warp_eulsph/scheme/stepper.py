@@ -121,7 +121,7 @@ class Stepper(World, ABC):
     def _update(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.update(state)
-        if self.exchanging:  # M23
+        if self.exchanging:  # M24
             for medium in self.exchanging:
                 medium.find_exchange()
             self._reflect()

@@ -1,4 +1,4 @@
-"""The other half of the acoustic flux: volume that flows from where pressure is high to where it is low (M23)."""
+"""The other half of the acoustic flux: volume that flows from where pressure is high to where it is low (M24)."""
 
 import functools
 
@@ -29,7 +29,7 @@ def _make_pressure(space: Space) -> wp.Kernel:
 
 @functools.cache
 def _make_exchange(space: Space) -> wp.Kernel:
-    """Kernel: ΔV_a/V_a = −ε Δt/V_a Σ_b A_ab [p_b − p_a − ½(∇p_a + ∇p_b)·ξ]/(Z_a + Z_b), A_ab = V_a V_b |W'| (M23).
+    """Kernel: ΔV_a/V_a = −ε Δt/V_a Σ_b A_ab [p_b − p_a − ½(∇p_a + ∇p_b)·ξ]/(Z_a + Z_b), A_ab = V_a V_b |W'| (M24).
 
     The velocity of the interface between two ends that have different pressures, as M9 has the pressure of one between
     different velocities; antisymmetric in volume, zero for linear pressures.
@@ -106,7 +106,7 @@ def _make_take(space: Space, law: Law) -> wp.Kernel:
 
 
 class VolumeFlux:
-    """M23 at work on one medium of fluids."""
+    """M24 at work on one medium of fluids."""
 
     def __init__(self, space: Space, flux: Flux, particles: ParticleArrays, change: wp.array, device: wp.DeviceLike):
         self.space, self.flux, self.particles, self.change = space, flux, particles, change
