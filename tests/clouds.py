@@ -5,6 +5,7 @@ import warp as wp
 
 from warp_eulsph import CubicSpline, Space
 from warp_eulsph.fields import allocate
+from warp_eulsph.geometry import box
 from warp_eulsph.scheme.reference import Configuration
 
 
@@ -13,6 +14,29 @@ def cloud(dim, side=6, jitter=0.2, seed=1):
     rng = np.random.default_rng(seed)
     ticks = np.stack(np.meshgrid(*[np.arange(side)] * dim, indexing="ij"), -1).reshape(-1, dim)
     return (ticks + 0.5 + rng.uniform(-jitter, jitter, ticks.shape)) / side, np.full(len(ticks), float(side) ** -dim)
+
+
+#: Particles along an edge of a block, by dimension.
+COUNT = {1: 16, 2: 8, 3: 6}
+
+
+def block(dim, jitter=0.2, shape=None):
+    """A block of unit spacing with edges and corners, (n, dim)."""
+    shape = (COUNT[dim],) * dim if shape is None else shape
+    x, _ = box((0.0,) * dim, tuple(map(float, shape)), 1.0)
+    return x + jitter * np.random.default_rng(4).uniform(-1.0, 1.0, x.shape)
+
+
+#: Blocks with all that shortens a step: edges, corners, jitter, two particles across.
+BODIES = {
+    "square": block(2, 0.0, (12, 12)),
+    "jittered square": block(2, 0.2, (12, 12)),
+    "strip": block(2, 0.0, (14, 2)),
+    "cube": block(3, 0.0),
+    "jittered cube": block(3),
+    "jittered plate": block(3, 0.1, (7, 7, 2)),
+    "rod": block(3, 0.0, (10, 2, 2)),
+}
 
 
 def configuration_of(x, volume, h, *, weight=CubicSpline(), real=wp.float64, box=None, density=1.0):

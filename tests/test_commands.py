@@ -72,7 +72,7 @@ def test_run_resume_info_check(case, tmp_path, capsys, caplog):
     whole, split = str(tmp_path / "whole"), str(tmp_path / "split")
     assert main(["run", str(case), "-o", whole]) == 0
     assert main(["run", str(case), "-o", split, "--max-wall", "0s"]) == 75
-    assert "stopped by wall limit of 0 s at step 1, t = 3.3" in caplog.text
+    assert "stopped by wall limit of 0 s at step 1, t = 2.7" in caplog.text
     assert f"warp-eulsph resume {split} goes on" in caplog.text
     case.rename(tmp_path / "elsewhere.py")  # the run keeps a copy
     Path(split).rename(tmp_path / "moved")

@@ -331,7 +331,7 @@ def test_looks_for_encounters_are_few_while_bodies_are_apart(monkeypatch):
         [es.Body(**block_of((0.0, 0.0)), **slow), block((3.0, 0.0), "far")], reference=es.Never()
     )
     simulation.run(until=0.1)
-    assert simulation.steps > 300 and len(looks) - 1 <= simulation.steps // MOST
+    assert simulation.steps > 300 and len(looks) - 2 <= simulation.steps // MOST  # one at the start, one soon after
 
 
 def test_comparing_places_takes_a_small_share_of_the_time(monkeypatch):

@@ -83,8 +83,8 @@ def test_the_tie_yields_and_its_books_close(simd):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_every_reference_gives_the_same_answer(dim):
-    """The arrangement read anew each step, each tenth, and never, without tie and tilt."""
-    scheme = es.Verlet(tie=None, tilt=None)
+    """The arrangement read anew each step, each tenth, and never, without what fixed ones have."""
+    scheme = es.Verlet(tie=None, tilt=None, sharpening=None)
     found = [block(dim, policy, scheme=scheme) for policy in (es.Never(), es.Always(), es.Every(10))]
     for simulation in found:
         simulation.run(4e-6)
@@ -185,7 +185,7 @@ def test_a_pulled_block_holds_and_its_tie_yields():
         assert abs(energy["residual"]) < 1e-12 * work and abs(energy["stepping"]) < 1e-3 * work
     free, tied, stiff = found
     assert tied[0] == pytest.approx(free[0], rel=0.08) and tied[2] < 0.9 * free[2]
-    assert tied[1] < 0.04 and stiff[1] > 0.3 and stiff[0] > 2.0 * free[0]
+    assert tied[1] < 0.04 and stiff[1] > 0.2 and stiff[0] > 1.8 * free[0]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

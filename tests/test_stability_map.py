@@ -54,8 +54,8 @@ def test_explicit_midpoint_gains_exactly_what_it_should(cfl):
 
 @pytest.mark.parametrize("cfl", [0.4, 1.0, 2.4])
 def test_verlet_keeps_every_wave_as_it_is(cfl):
-    """Without dissipation and tie |λ| = 1 as long as ωΔt < 2: up to CFL 2.55 on a line."""
-    point = Point(dim=1, across=16, scheme=Verlet(dissipation=None, tie=None), cfl=cfl)
+    """Without dissipation and tie |λ| = 1 as long as ωΔt < 2: up to CFL 2.55 on a line, not sharpened."""
+    point = Point(dim=1, across=16, scheme=Verlet(dissipation=None, tie=None, sharpening=None), cfl=cfl)
     assert frequencies(16, 1.3).max() * cfl < 2.0
     np.testing.assert_allclose(np.abs(eigenvalues(point)), 1.0, atol=1e-6)
     assert spectral_radius(replace(point, cfl=2.6)) > 1.1
@@ -113,8 +113,8 @@ def test_less_dissipation_does_not_lower_the_limit_of_verlet():
         return spectral_radius(replace(body, scheme=scheme, cfl=cfl)) <= 1.0 + RESOLVED
 
     less = es.Upwind(0.25)
-    assert holds(Verlet(dissipation=less, tie=None, tilt=None), 1.55)
-    assert not holds(Verlet(tie=None, tilt=None), 1.55)
+    assert holds(Verlet(dissipation=less, tie=None, tilt=None, sharpening=None), 1.55)
+    assert not holds(Verlet(tie=None, tilt=None, sharpening=None), 1.55)
     assert holds(LW(), 0.7) and not holds(LW(dissipation=less), 0.7)
 
 

@@ -5,20 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 import warp as wp
+from clouds import BODIES, COUNT, block
 
 import warp_eulsph as es
 from warp_eulsph import execution
-from warp_eulsph.geometry import box
 
 STEEL = es.LinearElastic(density=1.0, young=1.0, poisson=0.3)
-COUNT = {1: 16, 2: 8, 3: 6}
-
-
-def cloud(dim, jitter=0.2, shape=None):
-    """A block of unit spacing with edges and corners, (n, dim)."""
-    shape = (COUNT[dim],) * dim if shape is None else shape
-    x, _ = box((0.0,) * dim, tuple(map(float, shape)), 1.0)
-    return x + jitter * np.random.default_rng(4).uniform(-1.0, 1.0, x.shape)
 
 
 def simulation(x, tilt=es.Tilt(), dtype=wp.float64, tie=None, velocity=None, **options):
@@ -41,7 +33,7 @@ def rows(configuration):
 class TestIdentities:
     def test_gradient_is_exact_for_linear_fields(self, dim, dtype, simd):
         execution.set_simd(simd)
-        x, A = cloud(dim), np.random.default_rng(0).normal(size=(dim, dim))
+        x, A = block(dim), np.random.default_rng(0).normal(size=(dim, dim))
         stepper = simulation(x, dtype=dtype, velocity=x @ A.T).stepper
         stepper._velocity_gradient(stepper.U)
         error = np.abs(stepper.grad_v.numpy() - A).max()
@@ -50,7 +42,7 @@ class TestIdentities:
     def test_forces_are_the_adjoint_of_the_gradient(self, dim, dtype, simd):
         """Σ f·v = −Σ V Q:∇v for any Q and v; the forces sum to zero, and so do their moments where Q is symmetric."""
         execution.set_simd(simd)
-        x, rng = cloud(dim), np.random.default_rng(1)
+        x, rng = block(dim), np.random.default_rng(1)
         n, v = len(x), rng.normal(size=x.shape)
         made = simulation(x, dtype=dtype, velocity=v)
         stepper, medium = made.stepper, made.stepper.medium
@@ -74,7 +66,7 @@ class TestIdentities:
 @pytest.mark.parametrize("dim", [1, 2, 3])
 def test_third_moments_vanish_where_the_bound_lets_them(dim):
     """Σ w t |ξ|² ξ is zero where |μ| < most, and points along μ where it is not: the least Φ within the bound."""
-    made = simulation(cloud(dim))
+    made = simulation(block(dim))
     a, _, xi, own, _ = rows(made.configuration)
     n = len(made.x)
 
@@ -82,7 +74,7 @@ def test_third_moments_vanish_where_the_bound_lets_them(dim):
         weighted = (w * (xi**2).sum(axis=1))[:, None] * xi
         return np.stack([np.bincount(a, column, n) for column in weighted.T], axis=1)
 
-    untilted = simulation(cloud(dim), tilt=None).configuration.near.w.numpy()
+    untilted = simulation(block(dim), tilt=None).configuration.near.w.numpy()
     scale = np.bincount(a, untilted * np.linalg.norm(xi, axis=1) ** 3, n)
     before, after = (np.linalg.norm(moment(w), axis=1) / scale for w in (untilted, own))
     # μ from the two weights of a pair: ln(own/w) = −μ·ξ, by least squares over the row
@@ -99,7 +91,7 @@ def test_third_moments_vanish_where_the_bound_lets_them(dim):
 
 
 def test_inside_a_lattice_nothing_is_tilted():
-    x = cloud(2, jitter=0.0, shape=(16, 16))
+    x = block(2, jitter=0.0, shape=(16, 16))
     made, plain = simulation(x).configuration, simulation(x, tilt=None).configuration
     a, _, _, own, dual = rows(made)
     deep = (np.abs(x - 8.0).max(axis=1) < 2.5)[a]
@@ -130,17 +122,6 @@ def highest_frequency(x, tilt):
     return np.sqrt(rate), 0.5 * np.sqrt(rate) * step.dt
 
 
-BODIES = {
-    "square": cloud(2, 0.0, (12, 12)),
-    "jittered square": cloud(2, 0.2, (12, 12)),
-    "strip": cloud(2, 0.0, (14, 2)),
-    "cube": cloud(3, 0.0),
-    "jittered cube": cloud(3),
-    "jittered plate": cloud(3, 0.1, (7, 7, 2)),
-    "rod": cloud(3, 0.0, (10, 2, 2)),
-}
-
-
 def test_the_step_bears_it():
     """The share of 2/ω that a step is, in bodies with edges and corners: 0.81 at most, 0.78 without tilt."""
     without = {name: highest_frequency(x, None)[1] for name, x in BODIES.items()}
@@ -153,7 +134,7 @@ def test_the_step_bears_it():
 @pytest.mark.parametrize("dim", [2, 3])
 def test_dissipation_with_its_stress_takes_no_angular_momentum(dim):
     """M9 with ``stress=True``: a jittered block spun about, with a velocity that is rough from particle to particle."""
-    x = cloud(dim, 0.1)
+    x = block(dim, 0.1)
     middle = x - x.mean(axis=0)
     v = 0.2 * np.random.default_rng(5).normal(size=x.shape)
     v[:, 0] -= 0.05 * middle[:, 1]
@@ -197,7 +178,7 @@ def test_options_out_of_range_are_refused(most):
 @pytest.mark.parametrize("stress", [False, True])
 def test_simd_and_portable_passes_agree(stress, dim):
     """Forces and energies after ten steps of a rough start, with M9 by forces alone and with its stress."""
-    x = cloud(dim, 0.1)
+    x = block(dim, 0.1)
     v = 0.1 * np.random.default_rng(6).normal(size=x.shape)
     found = []
     for simd in (True, False):
@@ -215,7 +196,7 @@ def test_simd_and_portable_passes_agree(stress, dim):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_rotation_is_not_dragged_whatever_positions_say(dim, stress):
     """v = Ω x with positions a tenth of a spacing off F: no force of M9, of which Ω × r would be a jump."""
-    x = cloud(dim, 0.1)
+    x = block(dim, 0.1)
     turn = np.zeros((dim, dim))
     turn[1, 0], turn[0, 1] = 1.0, -1.0
     off = x + 0.03 * np.random.default_rng(7).uniform(-1.0, 1.0, x.shape)

@@ -56,6 +56,7 @@ from .scheme.limiter import FluxCorrectedTransport
 from .scheme.pair_areas import PairAreas
 from .scheme.policy import Always, Every, Never, ReferencePolicy, WhenDistorted
 from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
+from .scheme.sharpening import Sharpening
 from .scheme.shifting import Shifting
 from .scheme.smoothing import LinearExact, NeighbourAverage, Smoothing
 from .scheme.stabiliser import Correction
@@ -120,6 +121,7 @@ __all__ = [
     "SaintVenantKirchhoff",
     "Scheme",
     "Sensor",
+    "Sharpening",
     "Shepard",
     "Shifting",
     "Simulation",

@@ -76,6 +76,7 @@ class MediumPlan:
             fixed=policy.fixed,
             corrected=is_corrected(scheme, policy, given),
             tilt=scheme.tilt,
+            sharpened=scheme.sharpening is not None,
         )
         return MediumParts(scheme, policy, self.span, own, flux, configuration, given, groups_of(self.bodies))
 

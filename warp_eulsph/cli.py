@@ -34,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     commands = whole.add_subparsers(title="commands", metavar="COMMAND")
     for command in COMMANDS:
         command.add(commands)
+    whole.set_defaults(whole=whole)  # of which completion tells a shell
     return whole
 
 

@@ -19,6 +19,8 @@ SCATTER, CERTAIN = 0.2, 4.0
 LARGEST_CHANGE = 0.4
 # Depth beneath which the area vectors of a face in a lattice have ended: less than this part of a particle's face.
 ENDED, QUIET = 3.9, 0.02
+# Part by which cells and vectors of a lattice whose faces overlap differ at most, from twelve particles across on.
+APART = 0.003
 # Range of the heights of the outermost particles of a flat face: of one layer, jittered at most, and of two at most.
 EVEN, ROUGH = 0.45, 0.8
 # Part of the outermost particles of a flat face that may lie at steps of a layer or two.
@@ -102,15 +104,15 @@ def find_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Fac
 
 
 def _ends(body: Surface, face: Face, depth: np.ndarray, of_cells: float) -> bool:
-    """Whether the area vectors end within the columns, as in lattices: then they sum to the face to round-off.
+    """Whether the area vectors end within the columns and sum to something else than the cells, which are then wrong.
 
-    Beside staggered edges some do not; there the sum is better than the cells if these say something else by far.
+    In lattices both are the face, the cells to round-off; beside staggered edges the sum is nearer.
     """
     deep = depth[face.members] > ENDED * body.spacing
     if len(np.unique(face.columns[deep])) < 0.9 * len(face.tops):
         return False
     quiet = (np.abs(face.areas[deep]) < QUIET * body.size[face.members[deep]]).mean()
-    return bool(quiet == 1.0 or (quiet > 0.35 and abs(of_cells / face.areas.sum() - 1.0) > 0.01))
+    return bool(quiet > 0.35 and abs(of_cells / face.areas.sum() - 1.0) > APART)
 
 
 def sloping(body: Surface, n: np.ndarray, least: float) -> np.ndarray:

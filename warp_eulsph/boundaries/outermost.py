@@ -12,7 +12,7 @@ BLOCKING, LEAST_HEIGHT, HEIGHT = 0.75, 0.5, 2.2
 # bodies those of inner particles reach 0.4.
 LARGE, FACING = 0.5, 0.05
 # How far beneath its outermost particle the area vectors of a column reach, and how far beside.
-DEPTH, BESIDE = 5.2, 1.2
+DEPTH, BESIDE = 7.8, 1.2
 
 
 @dataclass(frozen=True)

@@ -29,16 +29,13 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print; 0, or 2 without shtab."""
-    from ..cli import parser
-
     try:
         import shtab
     except ModuleNotFoundError:
         print("warp-eulsph: completion needs shtab: pip install 'warp_eulsph[completion]'", file=sys.stderr)
         return 2
-    whole = parser()
-    _note_files(whole)
-    print(shtab.complete(whole, arguments.shell))
+    _note_files(arguments.whole)
+    print(shtab.complete(arguments.whole, arguments.shell))
     return 0
 
 

@@ -1,12 +1,13 @@
 """What an interaction declares: forces between bodies, or between bodies and something that moves beside them."""
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 
 from ..boundaries import Assembly
+from ..structs import StateArrays
 
 if TYPE_CHECKING:
     from ..scheme.world import World
@@ -48,7 +49,7 @@ class BoundInteraction(ABC):
         """Derive what the evolving arrays determine, after they were overwritten or particles changed places."""
 
     @abstractmethod
-    def forces(self, world: "World", state: Any, fraction: float, out: wp.array) -> None:
+    def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
         """Add forces [N] at ``state``, at time t + fraction · Δt, to ``out``, (n,) of vec by place.
 
         Called once or twice a step; the last call is that of the full step. Pair forces keep momentum to round-off if

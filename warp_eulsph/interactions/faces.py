@@ -64,7 +64,7 @@ def surface_weight(space: Space) -> tuple[Any, Any]:
 
 
 @functools.cache
-def alike_vectors(space: Space) -> Any:
+def alike_vectors(space: Space) -> wp.Function:
     """``wp.func`` whether two area vectors may be those of one face."""
     real, vec = space.real, space.vec
 
@@ -76,7 +76,7 @@ def alike_vectors(space: Space) -> Any:
 
 
 @functools.cache
-def least_two(space: Space) -> Any:
+def least_two(space: Space) -> wp.Function:
     """``wp.func`` which eigenvalues are the least and the next to it."""
     vec, dim = space.vec, space.dim
 
@@ -98,7 +98,7 @@ def least_two(space: Space) -> Any:
 
 
 @functools.cache
-def make_outward(space: Space) -> Any:
+def make_outward(space: Space) -> wp.Kernel:
     """Kernel: which way out is, −2 V_a Σ_b w_ab ξ [m^(d−1)], where the arrangement moves."""
     vec, real, separation = space.vec, space.real, difference(space)
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -115,7 +115,7 @@ def make_outward(space: Space) -> Any:
 
 
 @functools.cache
-def make_find(space: Space) -> Any:
+def make_find(space: Space) -> wp.Kernel:
     """Kernel: whether a particle is outermost: a large area vector, and none above it (``boundaries/outermost.py``).
 
     Fragments without an area vector, which have hardly any neighbours, are outermost.
@@ -171,7 +171,7 @@ def make_find(space: Space) -> Any:
 
 
 @functools.cache
-def make_area(space: Space) -> Any:
+def make_area(space: Space) -> wp.Kernel:
     """Kernel: the face of each outermost particle, 1/Σ_b φ_ab over those of its face, and how far these are from flat.
 
     What was outermost before keeps both: energies that depend on them must not jump.

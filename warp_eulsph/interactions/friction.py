@@ -1,7 +1,6 @@
 """Coulomb friction: how far what touches has slipped elastically, and what slides."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -12,7 +11,7 @@ from .law import meeting, pressure, rows_structure, skin_structure, stiffness
 
 
 @functools.cache
-def make_slip(space: Space) -> Any:
+def make_slip(space: Space) -> wp.Kernel:
     """Kernel: the elastic slip of each particle after a step [m], from means over what presses on it.
 
     It grows by the step's motion of the others against it, Σ A_b φ p (v_b − v_a) Δt over Σ A_b φ p, along the surface;

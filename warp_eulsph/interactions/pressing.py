@@ -14,9 +14,10 @@ from .shapes import Numbers, Triangles
 
 @functools.cache
 def trace_structure(space: Space) -> Any:
-    """Points of surfaces: ``start``, ``places`` and ``weights`` of their rows, ``half`` [m], ``stiffness`` [N/m], and
+    """Points of surfaces: ``start``, ``places`` and ``weights`` of their rows, ``half`` [m], and what they oppose.
 
-    ``inertia`` [1/kg], what the particles of a row oppose to a force on it, Σ ω²/m.
+    ``stiffness`` [N/m] along the normal, ``shear`` [N/m] across, and ``inertia`` [1/kg], how the particles of a row
+    answer a force on it, Σ ω²/m.
     """
 
     @wp.struct
@@ -26,6 +27,7 @@ def trace_structure(space: Space) -> Any:
         weights: wp.array(dtype=space.real)
         half: wp.array(dtype=wp.float64)
         stiffness: wp.array(dtype=wp.float64)
+        shear: wp.array(dtype=wp.float64)
         inertia: wp.array(dtype=wp.float64)
 
     return TracePoints
@@ -84,8 +86,20 @@ def make_measure(space: Space, distance: Any) -> wp.Kernel:
     return measure
 
 
+@wp.func
+def rubbed(y: wp.vec3d, anchor: wp.vec3d, n: wp.vec3d, stiffness: wp.float64, most: wp.float64) -> wp.vec3d:
+    """Friction on a point at y that was tied at ``anchor``: elastic along the surface, at most ``most`` (Coulomb)."""
+    slip = y - anchor
+    slip = slip - wp.dot(slip, n) * n
+    force = -stiffness * slip
+    size = wp.length(force)
+    if size > most:
+        force = force * (most / size)
+    return force
+
+
 @functools.cache
-def make_press(space: Space, distance: Any) -> wp.Kernel:
+def make_press(space: Space, distance: Any, rubs: bool) -> Any:
     """Kernel: the force of the rigid body on each point, what it does to the rigid body, and the energy it holds."""
     vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
 
@@ -98,6 +112,8 @@ def make_press(space: Space, distance: Any) -> wp.Kernel:
         side: wp.float64,
         numbers: Numbers,
         triangles: Triangles,
+        friction: wp.float64,
+        anchors: wp.array(dtype=wp.vec3d),
         push: wp.array(dtype=wp.vec3d),
         wrench: wp.array(dtype=Wrench),
         energy: wp.array(dtype=wp.float64),
@@ -105,14 +121,54 @@ def make_press(space: Space, distance: Any) -> wp.Kernel:
         k = first + wp.tid()
         y = read(points, k, x)
         found = gap(y, pose, side, numbers, triangles)
+        n = wp.vec3d(found[0], found[1], found[2])
         depth = wp.max(points.half[k] - found[3], wp.float64(0.0))
-        force = points.stiffness[k] * depth * wp.vec3d(found[0], found[1], found[2])
+        normal = points.stiffness[k] * depth
+        force = normal * n
+        held = wp.float64(0.5) * normal * depth
+        if wp.static(rubs):
+            shear = points.shear[k]
+            if depth > wp.float64(0.0) and shear > wp.float64(0.0):
+                tangential = rubbed(y, pose.x[0] + pose.R[0] @ anchors[k], n, shear, friction * normal)
+                force += tangential
+                held += wp.float64(0.5) * wp.dot(tangential, tangential) / shear
         moment = wp.cross(y - pose.x[0], force)
         push[k] = force
         wrench[k] = -Wrench(force[0], force[1], force[2], moment[0], moment[1], moment[2])
-        energy[k] = wp.float64(0.5) * points.stiffness[k] * depth * depth
+        energy[k] = held
 
     return press
+
+
+@functools.cache
+def make_tie(space: Space, distance: Any) -> Any:
+    """Kernel: where each point is tied to the rigid body, in its frame: after a step where it is, less elastic slip."""
+    vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def tie(
+        first: int,
+        points: TracePoints,
+        x: wp.array(dtype=vec),
+        pose: Pose,
+        side: wp.float64,
+        numbers: Numbers,
+        triangles: Triangles,
+        friction: wp.float64,
+        anchors: wp.array(dtype=wp.vec3d),
+    ):
+        k = first + wp.tid()
+        y = read(points, k, x)
+        R, tied = pose.R[0], y
+        found = gap(y, pose, side, numbers, triangles)
+        depth, shear = points.half[k] - found[3], points.shear[k]
+        if depth > wp.float64(0.0) and shear > wp.float64(0.0):
+            n = wp.vec3d(found[0], found[1], found[2])
+            most = friction * points.stiffness[k] * depth
+            tied = y + rubbed(y, pose.x[0] + R @ anchors[k], n, shear, most) / shear
+        anchors[k] = wp.transpose(R) @ (tied - pose.x[0])
+
+    return tie
 
 
 @functools.cache
@@ -146,7 +202,8 @@ def make_gather(space: Space) -> wp.Kernel:
 def make_ask(space: Space, distance: Any) -> wp.Kernel:
     """Kernel: squares of frequencies [1/s²] of the points that touch, or may in the step to come.
 
-    The largest k Σ ω²/m of a point, and k (1/M + r²/I) of each, which add up to a bound for the rigid body.
+    The largest k Σ ω²/m of a point, and k (1/M + r²/I) of each, which add up to a bound for the rigid body; with
+    friction r² counts twice, for the force across.
     """
     vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
     Clock, raise_largest = clock_structure(space), raise_to(wp.float64)

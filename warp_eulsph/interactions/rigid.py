@@ -8,12 +8,13 @@ import numpy as np
 import warp as wp
 
 from ..boundaries import Assembly
+from ..checks import real_number
 from ..execution import Launcher
 from ..reduce import Sum
 from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .free import Free
-from .pressing import make_ask, make_gather, make_measure, make_press, make_raise, trace_structure
+from .pressing import make_ask, make_gather, make_measure, make_press, make_raise, make_tie, trace_structure
 from .rigid_motion import Held, RigidMotion, Wrench, make_pose, rotation_matrix, spatial, turning
 from .shapes import Numbers, Shape
 from .traces import Traces, find_traces
@@ -27,11 +28,14 @@ AXIAL = {1: slice(0, 0), 2: slice(2, 3), 3: slice(0, 3)}
 
 @dataclass(frozen=True)
 class RigidBody(Interaction):
-    """A rigid body that pushes the bodies that touch it, without friction.
+    """A rigid body that pushes the bodies that touch it, and rubs on them.
 
     Nothing is to be tuned: a point of a body's surface (``traces``) that is a depth g inside is pushed out by
     A M g/spacing, A its area and M = ρ c² the modulus of pressure waves of the body's material at the start: as stiff
     as one layer of particles. A point is only pushed, never pulled. Rigid bodies do not feel each other.
+
+    Friction is Coulomb's: a point that touches is tied where it began to, by a spring of A G/spacing, G = ρ c_s² of
+    shear waves, until that pulls with ``friction`` times the force along the normal; then it slides.
 
     Where a body overlaps by less than half a spacing at the start it is taken to touch there, without a force: no face
     is known better.
@@ -43,6 +47,7 @@ class RigidBody(Interaction):
         motion: Held(), Moving(velocity, spin), Driven(displacement) or Free(mass, ...).
         bodies: names of those that it touches; all by default.
         hollow: its matter is what lies outside of the shape: a container.
+        friction: Coulomb's coefficient, 0 without.
         name: for messages, probes and tables.
 
     Raises:
@@ -56,7 +61,12 @@ class RigidBody(Interaction):
     motion: RigidMotion = Held()
     bodies: Sequence[str] | None = None
     hollow: bool = False
+    friction: float = 0.0
     name: str = "rigid"
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(real_number(self.friction, "RigidBody: friction")) and self.friction >= 0.0):
+            raise ValueError(f"RigidBody: friction must be 0 or more and finite, got {self.friction}")
 
     def bind(self, assembly: Assembly) -> "BoundRigidBody":
         if self.hollow and isinstance(self.motion, Free):
@@ -89,7 +99,8 @@ class BoundRigidBody(BoundInteraction):
         self._launch = Launcher(device)
         numbers = [*self._solid.numbers, *[0.0] * 6][:6]
         self._shape = [-1.0 if option.hollow else 1.0, Numbers(*numbers), self._solid.triangles]
-        inertia = max(self.motion.inverse_inertia)
+        self._rubs = option.friction > 0.0
+        inertia = float(max(self.motion.inverse_inertia)) * (2.0 if self._rubs else 1.0)
         self._inverse = wp.vec2d(self.motion.inverse_mass, inertia)
         self._wrench, self._asked = (
             wp.zeros(1, dtype=Wrench, device=device),
@@ -99,7 +110,7 @@ class BoundRigidBody(BoundInteraction):
 
     def start(self, world: "World") -> None:
         order, who = self.assembly.order, f"rigid body {self.option.name!r}"
-        moduli = [modulus for medium in world.media for modulus, _ in medium.flux.moduli()]
+        moduli = np.array([both for medium in world.media for both in medium.flux.moduli()])
         laws = [part.law for _, part in world.remembering]
         flowing = np.array([law.update is not None and not law.history for law in laws])
         body = order.by_number(world.particles.body.numpy())
@@ -108,10 +119,10 @@ class BoundRigidBody(BoundInteraction):
         mass, spacing = (
             order.by_number(a.numpy()).astype(float) for a in (world.particles.mass, world.particles.spacing)
         )
-        stiffness = traces.areas * np.array(moduli)[body[traces.tops]] / spacing[traces.tops]
+        stiffness, shear = traces.areas * moduli[body[traces.tops]].T / spacing[traces.tops]
         m, row = len(traces.tops), np.repeat(np.arange(len(traces.tops)), np.diff(traces.start))
         inertia = np.bincount(row, traces.weights**2 / mass[traces.members], minlength=m)
-        self._points = self._fill(traces, stiffness, inertia)
+        self._points = self._fill(traces, stiffness, shear, inertia)
         self._by_particle(traces, row)
         device = self.device
         self._push, self._wrenches = (
@@ -122,14 +133,16 @@ class BoundRigidBody(BoundInteraction):
         self._add_wrenches, self._add = Sum(Wrench, m, device), Sum(wp.float64, m, device)
         gaps = self._gaps(world, self._points, m)
         self._points.half.assign(traces.half + np.minimum(gaps, 0.0))
+        self._anchors = wp.zeros(m if self._rubs else 0, dtype=wp.vec3d, device=device)
+        self._tie(world)
 
-    def _fill(self, traces: Traces, stiffness: np.ndarray, inertia: np.ndarray) -> Any:
+    def _fill(self, traces: Traces, stiffness: np.ndarray, shear: np.ndarray, inertia: np.ndarray) -> Any:
         points, device = trace_structure(self.space)(), self.device
         points.start = wp.array(traces.start, dtype=wp.int32, device=device)
         self._places = points.places = self.assembly.order.places_of(traces.members)
         points.weights = wp.array(traces.weights, dtype=self.space.real, device=device)
-        points.half, points.stiffness, points.inertia = (
-            wp.array(values, dtype=wp.float64, device=device) for values in (traces.half, stiffness, inertia)
+        points.half, points.stiffness, points.shear, points.inertia = (
+            wp.array(values, dtype=wp.float64, device=device) for values in (traces.half, stiffness, shear, inertia)
         )
         return points
 
@@ -155,7 +168,7 @@ class BoundRigidBody(BoundInteraction):
         n, none = len(self.indices), np.zeros(len(self.indices))
         dim = self.space.dim
         alone = Traces(np.arange(n + 1), self.indices, none + 1.0, none, none, np.zeros((n, dim)), self.indices)
-        gaps = self._gaps(world, self._fill(alone, none, none), n)
+        gaps = self._gaps(world, self._fill(alone, none, none, none), n)
         inside = self.indices[gaps < 0.0]
         if len(inside):
             names = [name for name, own in self.assembly.bodies.items() if np.isin(inside, own).any()]
@@ -166,9 +179,17 @@ class BoundRigidBody(BoundInteraction):
                 "touches by bodies=[...]"
             )
 
-    def _press(self, state: StateArrays) -> None:
-        arguments = [self._points, state.x, self.motion.at, *self._shape, self._push, self._wrenches, self._energies]
-        self._launch(make_press(self.space, self.option.shape.distance), len(self._push), arguments)
+    def _press(self, state: Any) -> None:
+        arguments = [self._points, state.x, self.motion.at, *self._shape, float(self.option.friction), self._anchors]
+        kernel = make_press(self.space, self.option.shape.distance, self._rubs)
+        self._launch(kernel, len(self._push), [*arguments, self._push, self._wrenches, self._energies])
+
+    def _tie(self, world: "World") -> None:
+        """What friction remembers, at the end of a step."""
+        if self._rubs:
+            arguments = [self._points, world.U.x, self.motion.pose, *self._shape, float(self.option.friction)]
+            kernel = make_tie(self.space, self.option.shape.distance)
+            self._launch(kernel, len(self._push), [*arguments, self._anchors])
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
         self.motion.look(world.clock.fields, fraction)
@@ -187,6 +208,7 @@ class BoundRigidBody(BoundInteraction):
 
     def advance(self, world: "World") -> None:
         self.motion.advance(world.clock.fields, self._wrench)
+        self._tie(world)
 
     def energy(self, world: "World") -> float:
         self.motion.look(world.clock.fields, 0.0)
@@ -198,7 +220,8 @@ class BoundRigidBody(BoundInteraction):
         return float(self.motion.work.numpy()[0])
 
     def evolving(self) -> dict[str, wp.array]:
-        return {**self.motion.evolving(), "wrench": self._wrench}
+        own = {"wrench": self._wrench, "anchors": self._anchors} if self._rubs else {"wrench": self._wrench}
+        return {**self.motion.evolving(), **own}
 
     def _row(self, array: wp.array, components: slice) -> np.ndarray:
         return np.array(array.numpy()[0, components])  # a copy: on the CPU it is the array's own memory

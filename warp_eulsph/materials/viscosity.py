@@ -52,7 +52,7 @@ class Newtonian(Viscosity):
 
     @staticmethod
     @functools.cache
-    def make_viscosity(real: type, Constants: Any) -> Any:
+    def make_viscosity(real: type, Constants: Any) -> wp.Function:
         @wp.func
         def newtonian(rate: real, c: Constants) -> real:
             return c.eta
@@ -94,7 +94,7 @@ class PowerLaw(Viscosity):
 
     @staticmethod
     @functools.cache
-    def make_viscosity(real: type, Constants: Any) -> Any:
+    def make_viscosity(real: type, Constants: Any) -> wp.Function:
         @wp.func
         def power_law(rate: real, c: Constants) -> real:
             # A thinning fluid at rest: its largest viscosity, where the power has no value

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from .dissipation import Upwind
 from .limiter import FluxCorrectedTransport
+from .sharpening import Sharpening
 from .shifting import Shifting
 from .smoothing import Smoothing
 from .stabiliser import Correction
@@ -30,6 +31,7 @@ class Scheme(ABC):
     shifting: Shifting | None = None
     tie: Tie | None = None
     tilt: Tilt | None = None
+    sharpening: Sharpening | None = None
     #: Tested Courant number.
     cfl: ClassVar[float]
 

@@ -10,25 +10,8 @@ from ..simd import BY_TWO_DUAL, packed_rows, prelude
 from ..space import Space
 from ..structs import StateArrays
 from .reference import Configuration
+from .sharpening import Sharpener, make_pack
 from .stabiliser import Stabiliser, Sums
-
-
-@functools.cache
-def _make_pack(space: Space) -> wp.Kernel:
-    """Kernel: columns of Π = Q Lᵀ (M5), made here, each with a coordinate of x, side by side."""
-    real, dim = space.real, space.dim
-    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def pack(first: int, reference: Reference, flux: Flux, rows: wp.array2d(dtype=real)):
-        a = first + wp.tid()
-        x_a, Pi_a = reference.x[a], flux.Q[a] @ wp.transpose(reference.L[a])
-        for j in range(wp.static(dim)):
-            rows[a, 4 * j + 3] = x_a[j]
-            for i in range(wp.static(dim)):
-                rows[a, 4 * j + i] = Pi_a[i, j]
-
-    return pack
 
 
 @functools.cache
@@ -91,12 +74,12 @@ def _make_forces(space: Space, tilted: bool) -> wp.Kernel:
 
 
 class DualForces(Stabiliser):
-    """M5 at work; what dissipates and ties there is in the stress already (M9, M16)."""
+    """M5 at work, sharpened or not (M23); what dissipates and ties there is in the stress already (M9, M16)."""
 
     corrects = False
 
-    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
-        self.space, self._launch = space, Launcher(device)
+    def __init__(self, space: Space, n: int, sharpener: Sharpener | None, device: wp.DeviceLike):
+        self.space, self._sharpener, self._launch = space, sharpener, Launcher(device)
         self._rows = packed_rows(space, n, space.dim, device)
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
@@ -108,10 +91,14 @@ class DualForces(Stabiliser):
 
     def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
         """Internal force (M5)."""
-        configuration, internal = sums.configuration, sums.forces.internal
+        configuration, flux, internal, rows = sums.configuration, sums.flux, sums.forces.internal, self._rows
+        if configuration.simd or self._sharpener is not None:
+            self._launch(make_pack(self.space), len(internal), [configuration.fields, flux.Q, rows])
+        if self._sharpener is not None:
+            self._sharpener.stress(flux.Q, rows, flux.Pi)
+            rows = self._sharpener.stress_rows
         if not configuration.simd:
-            configuration.divergence(sums.flux.Pi, internal)
+            configuration.divergence(flux.Pi, internal)
             return
-        self._launch(_make_pack(self.space), len(internal), [configuration.fields, sums.flux, self._rows])
         kernel = _make_forces(self.space, configuration.tilt is not None)
-        self._launch(kernel, len(internal), [configuration.fields, configuration.near, self._rows, internal])
+        self._launch(kernel, len(internal), [configuration.fields, configuration.near, rows, internal])

@@ -21,9 +21,11 @@ from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
+from .sharpening import Sharpener
 from .shifting import Shifter
 from .stabiliser import Stabiliser, Sums
 from .updates import make_drift, make_kick, make_mean, make_predict
+from .volume_flux import VolumeFlux
 
 
 @dataclass(frozen=True)
@@ -74,8 +76,8 @@ class Medium:
 
     Attributes:
         surface_given: the bodies came with their area vectors.
-        stabiliser: of its reference. pairs, limiter, shifter: None where the options have none.
-        heating: None where no law takes heat.
+        stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
+        heating: None where no law takes heat. volumes: None where no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
     """
@@ -96,7 +98,12 @@ class Medium:
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
-        self.stabiliser: Stabiliser = DualForces(space, n, device) if plain else UpwindForces(space, device)
+        self.sharpener: Sharpener | None = None
+        if self.configuration.sharpened:
+            self.sharpener = Sharpener(space, self.configuration, n, device)
+        self.stabiliser: Stabiliser = UpwindForces(space, device)
+        if plain:
+            self.stabiliser = DualForces(space, n, self.sharpener, device)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
             _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
             self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
@@ -115,6 +122,7 @@ class Medium:
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
         self.heating: Heating | None = None
+        self.volumes: VolumeFlux | None = None
         self.smoothed_F_k = self.configuration.fields.F
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
@@ -147,10 +155,20 @@ class Medium:
         """Whether its dissipation heats a law of its bodies."""
         return self.options.dissipation is not None and any(part.law.heat is not None for part in self.flux.parts)
 
-    def take_heat(self, heat: wp.array, v_old: wp.array) -> None:
-        """See the own particles of the world's heat [J] and of the velocities [m/s] before the step."""
-        own = part_of(heat, self.span), part_of(v_old, self.span)
-        self.heating = Heating(self.space, self.flux, self.particles, *own, self.device)
+    @property
+    def exchanges(self) -> bool:
+        """Whether volume flows between its pairs."""
+        upwind = self.options.dissipation
+        return upwind is not None and upwind.volume and self.flux.forgets and not self.policy.fixed
+
+    def take_scratch(self, scratch: wp.array, v_old: wp.array) -> None:
+        """See the own particles of the world's scratch and of the velocities [m/s] before the step."""
+        own, before = part_of(scratch, self.span), part_of(v_old, self.span)
+        if self.heats:
+            self.heating = Heating(self.space, self.flux, self.particles, own, before, self.device)
+        if self.exchanges:
+            self.flux.keep_dissipated()
+            self.volumes = VolumeFlux(self.space, self.flux, self.particles, own, self.device)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -169,12 +187,15 @@ class Medium:
     def find_surface(self, state: StateArrays) -> None:
         """s_a = e_a at the start (M10)."""
         nothing_yet = self.forces.free_v
-        self.configuration.defect(nothing_yet, self.of(state).surface)
+        unit = None if self.sharpener is None else self.sharpener.unit()
+        self.configuration.defect(nothing_yet, self.of(state).surface, unit)
 
     def look_outward(self, state: StateArrays) -> None:
-        """Which way out is: by the area vectors, unless weights are tilted."""
-        if self.configuration.tilt is None:
+        """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""
+        if self.configuration.tilt is None and self.sharpener is None:
             wp.copy(self.particles.outward, self.of(state).surface)
+        elif self.configuration.tilt is None:
+            self.configuration.defect(self.forces.free_v, self.particles.outward)
 
     def move(self, state: StateArrays) -> None:
         """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
@@ -215,8 +236,9 @@ class Medium:
     # the lines of a step
 
     def velocity_gradient(self, state: StateArrays, out: wp.array | None = None) -> None:
-        """∇_k v (M4), into ``grad_v`` by default."""
-        self.configuration.gradient(self.of(state).v, self.grad_v if out is None else out)
+        """∇_k v (M4, M23), into ``grad_v`` by default."""
+        gradient = self.configuration.gradient if self.sharpener is None else self.sharpener.gradient
+        gradient(self.of(state).v, self.grad_v if out is None else out)
 
     def keep_gradient(self, state: StateArrays) -> None:
         """∇_k v of a state in which a step begins, where it is kept."""
@@ -314,6 +336,16 @@ class Medium:
         """That heat into the laws."""
         if self.heating is not None:
             self.heating.take(self.of(state).F, self.clock)
+
+    def find_exchange(self) -> None:
+        """What volume flows between pairs (M24)."""
+        if self.volumes is not None:
+            self.volumes.find(self.sums, self.clock)
+
+    def exchange(self, state: StateArrays) -> None:
+        """That volume into J."""
+        if self.volumes is not None:
+            self.volumes.take(self.of(state).F)
 
     def evolving(self) -> dict[str, wp.array]:
         """Every array of its own that a step reads before it writes it, by name."""

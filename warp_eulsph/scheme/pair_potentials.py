@@ -292,7 +292,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
                     jump -= (D[a] + D[b]) @ (now * real(0.5))
                 else:
                     jump -= (grad_v[a] + grad_v[b]) @ (xi * real(0.5))
-                    jump -= turned(spin_of(D[a] + D[b]) * real(0.5), off, wp.length(xi) * real(0.5))
+                    jump -= turned(spin_of(D[a] + D[b]) * real(0.5), off, wp.length(xi))
                 jump = jump * epsilon
                 if wp.static(sensed):
                     jump = mix(jump, plain * epsilon, real(1.0), sensor[a], sensor[b])

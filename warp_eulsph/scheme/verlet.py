@@ -10,6 +10,7 @@ from .balance import Balance
 from .base import Scheme
 from .dissipation import Upwind
 from .limiter import FluxCorrectedTransport
+from .sharpening import Sharpening
 from .shifting import Shifting
 from .stabiliser import Correction
 from .stepper import Stepper
@@ -36,6 +37,8 @@ class Verlet(Scheme):
         tie: what ties positions to F where the arrangement does not move (M16); None leaves hourglass modes free.
         tilt: what pair weights are multiplied by near free faces, where the arrangement does not move (M17); None
             leaves coarse bodies soft.
+        sharpening: what takes the second-order error out of gradients and forces, where the arrangement does not move
+            (M23); None leaves waves dispersed and coarse bodies softer.
     """
 
     dissipation: Upwind | None = Upwind()
@@ -44,6 +47,7 @@ class Verlet(Scheme):
     shifting: Shifting | None = None
     tie: Tie | None = Tie()
     tilt: Tilt | None = Tilt()
+    sharpening: Sharpening | None = Sharpening()
     #: Tested Courant number; the limit is 1.1 to 1.3 in bounded 3-D bodies.
     cfl: ClassVar[float] = 0.8
 

@@ -195,6 +195,8 @@ class Step:
                 state = rest + self._scale(name) * deviation[:, first:last].reshape(rest.shape)
                 first = last
             getattr(U, name).assign(state)
+        for medium in self.simulation.stepper.media:
+            medium.keep_gradient(U)
         for potential in self._potentials():
             potential.zero_()
 

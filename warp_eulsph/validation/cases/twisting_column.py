@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...boundaries import Fixed
+from ...boundaries import Clamped
 from ...geometry import box
 from ...scheme.arrangement import Current
 from ...scheme.policy import Always, ReferencePolicy
@@ -21,13 +21,13 @@ SERIES = "twist_2"
 
 
 def build(n: int, reference: ReferencePolicy, **options: Any) -> Simulation:
-    """The column, n particles across; the lowest layer is held."""
-    spacing = 1.0 / n
-    x, volume = box((-0.5, 0.0, -0.5), (0.5, HEIGHT, 0.5), spacing)
+    """The column, n particles across; clamped at its base."""
+    x, volume = box((-0.5, 0.0, -0.5), (0.5, HEIGHT, 0.5), 1.0 / n)
     spin = 105.0 * np.sin(np.pi * x[:, 1] / (2.0 * HEIGHT))
     velocity = np.stack([spin * x[:, 2], np.zeros(len(x)), -spin * x[:, 0]], axis=1)
     body = Body(x=x, volume=volume, material=RUBBER, velocity=velocity)
-    return Simulation(body, boundaries=[Fixed(lambda X: X[:, 1] < spacing)], reference=reference, **options)
+    base = Clamped(point=(0.0, 0.0, 0.0), normal=(0.0, -1.0, 0.0))
+    return Simulation(body, boundaries=[base], reference=reference, **options)
 
 
 def turned(x: np.ndarray, z: np.ndarray) -> np.ndarray:
