@@ -18,7 +18,7 @@ DRIVE = Variable("failure_drive", "-", "what the criterion has seen; 1 is the on
 
 @dataclass(frozen=True, kw_only=True)
 class Failing(Material):
-    """Ψ = (1 − D) Ψ_whole + D Ψ_p, P = (1 − D) P_whole + D P_p (M24): D = 1 is matter that bears pressure alone.
+    """Ψ = (1 − D) Ψ_whole + D Ψ_p, P = (1 − D) P_whole + D P_p (M25): D = 1 is matter that bears pressure alone.
 
     Ψ_p = κ/2 (ln J)² where J < 1, else nothing. The whole matter lives on in the strains, so that plasticity knows of
     damage as of a smaller section; of its dissipation 1 − D is done, and growing D dissipates (Ψ_whole − Ψ_p) ΔD: books
