@@ -106,6 +106,13 @@ def test_taylor_bar(run):
     assert 6.8 < figures["foot radius [mm]"] < 7.3
 
 
+def test_colliding_rings(run):
+    figures, frames = run("colliding_rings", "-n", "4")
+    assert frames == 11
+    assert abs(figures["taken by the contact / energy"]) < 0.005
+    assert figures["velocity of the left one, end / start"] < -0.3
+
+
 def test_failed_check_ends_the_example(run):
     """Six particles along the block's side are too few for the reaction at 15 ms."""
     with pytest.raises(SystemExit, match=r"outside the accepted band: .*'reaction at 15 ms"):
@@ -151,3 +158,9 @@ def test_table_of_figures():
     lines = table(figures).splitlines()
     assert [line.split()[-1] for line in lines[1:]] == ["ok", "OUTSIDE", "OUTSIDE", "ok"]
     assert lines[1].split() == ["inside", "1.5", "1.6", "1", "to", "2", "ok"]
+
+
+@pytest.mark.parametrize(("name", "n"), [("shock_tube", "100"), ("taylor_green", "32")])
+def test_fluids(run, name, n):
+    figures, frames = run(name, "-n", n)
+    assert frames == 11 and len(figures) >= 5

@@ -211,10 +211,10 @@ def largest_shortening(space: Space) -> wp.Function:
 
 
 @functools.cache
-def symmetric_eigen(space: Space) -> wp.Function:
-    """``wp.func`` (A) -> (eigenvectors as columns, eigenvalues) by cyclic Jacobi rotations."""
+def symmetric_eigen(space: Space, most: int = 8) -> wp.Function:
+    """``wp.func`` (A) -> (eigenvectors as columns, eigenvalues) by cyclic Jacobi rotations, ``most`` sweeps."""
     dim, real, mat, vec = space.dim, space.real, space.mat, space.vec
-    sweeps = 8 if dim > 1 else 0  # Jacobi converges quadratically: 3×3 matrices reach round-off in 4 to 6 sweeps
+    sweeps = most if dim > 1 else 0  # Jacobi converges quadratically: 3×3 matrices reach round-off in 4 to 6 sweeps
 
     @wp.func
     def symmetric_eigen(A: mat):

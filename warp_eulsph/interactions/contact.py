@@ -15,7 +15,7 @@ from ..execution import Launcher
 from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .friction import make_slip
-from .law import make_push, make_rate, skin_structure
+from .law import make_push, make_raise, make_rate, skin_structure
 from .nearby import Nearby
 from .skin import Skin
 
@@ -112,12 +112,14 @@ class BoundContact(BoundInteraction):
             setattr(self._arrays, name, getattr(self.skin, name))
         k, n, device = len(self.skin.indices), world.n, world.device
         self._energy = wp.zeros(k, dtype=wp.float64, device=device)
-        self._slope = wp.zeros(k, dtype=self.space.vec, device=device)
+        self._frequency = wp.zeros(1, dtype=self.space.real, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
         self.slip = wp.zeros(k if self.rubs else 0, dtype=self.space.vec, device=device)
         self._found_at = wp.zeros(k if self.skin.changes else 0, dtype=self.space.vec, device=device)
         if self.skin.changes:
             wp.copy(self._found_at, world.U.x[self.skin.places].contiguous())
+        if self._push(world, world.U, 0.0, self._nothing):
+            self._measure(world, world.U)
 
     def _check_apart(self, world: "World") -> None:
         """Raise ValueError where two bodies lie in each other."""
@@ -165,22 +167,24 @@ class BoundContact(BoundInteraction):
         if self.nearby.pairs:
             self.skin.look(state)
             arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.clock.fields, fraction]
-            arguments += [self.option.friction, self.slip, out, self._slope, self._energy]
+            arguments += [self.option.friction, self.slip, out, self.skin.slope, self._energy]
             self._launch(make_push(self.space, self.rubs), len(self.skin.indices), arguments)
-            self.skin.turn(state, self._slope, out)
+            self.skin.turn(state, out)
         return self.nearby.pairs > 0
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
-        self._push(world, state, fraction, out)
+        self._frequency.zero_()
+        if self._push(world, state, fraction, out):
+            self._measure(world, state)
+
+    def _measure(self, world: "World", state: StateArrays) -> None:
+        """The frequency that the next step is chosen by, with the normals that were found for ``state``."""
+        arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.particles, self._frequency]
+        self._launch(make_rate(self.space), len(self.skin.indices), arguments)
 
     def rate(self, world: "World") -> None:
         self._find(world.U.x)
-        self.nearby.look(world.U.x)
-        if self.nearby.pairs:
-            self.skin.look(world.U)
-            U, clock = world.U, world.clock.fields
-            arguments = [self._arrays, self.nearby.rows, U.x, U.v, world.particles, clock]
-            self._launch(make_rate(self.space), len(self.skin.indices), arguments)
+        self._launch.once(make_raise(self.space), 1, [self._frequency, world.clock.fields])
 
     def advance(self, world: "World") -> None:
         if self.rubs and self.nearby.pairs:  # by normals and places of the last forces
@@ -192,7 +196,7 @@ class BoundContact(BoundInteraction):
         return float(self._energy.numpy().sum()) if self._push(world, world.U, 0.0, self._nothing) else 0.0
 
     def evolving(self) -> dict[str, wp.array]:
-        held = {"slip": self.slip} if self.rubs else {}
+        held = {"frequency": self._frequency} | ({"slip": self.slip} if self.rubs else {})
         if self.skin.changes:
             held |= {
                 "found_at": self._found_at,

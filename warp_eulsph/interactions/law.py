@@ -128,6 +128,22 @@ def meeting(space: Space) -> Any:
 
 
 @functools.cache
+def in_reach(space: Space) -> Any:
+    """``wp.func`` whether d is within the range of the weight across and ``along`` sums of half widths along it."""
+    real, vec, SkinArrays = space.real, space.vec, skin_structure(space)
+
+    @wp.func
+    def in_reach(skin: SkinArrays, k: int, m: int, d: vec, along: real) -> bool:
+        across = real(wp.static(4.0 * REACH)) * wp.max(skin.half[k], skin.half[m])
+        if wp.static(space.dim == 1):
+            across = real(0.0)
+        r0 = along * (skin.half[k] + skin.half[m])
+        return wp.length_sq(d) < across * across + r0 * r0
+
+    return in_reach
+
+
+@functools.cache
 def stiffness(space: Space) -> Any:
     """``wp.func`` (skin, lower, upper) -> row 1/(w_a/M_a + w_b/M_b) of pressure and of shear [Pa/m]; 0 for liquids."""
     real, SkinArrays, pair = space.real, skin_structure(space), space.row(2)
@@ -159,7 +175,7 @@ def make_push(space: Space, rubs: bool) -> Any:
         stiffness(space),
         pressure(space),
     )
-    weight_of, slope_of = surface_weight(space)
+    (weight_of, slope_of), reaches = surface_weight(space), in_reach(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def push(
@@ -185,6 +201,8 @@ def make_push(space: Space, rubs: bool) -> Any:
             upper = wp.max(k, rows.index[i])
             a, b = skin.places[lower], skin.places[upper]
             d = x[b] - x[a]
+            if not reaches(skin, lower, upper, d, real(1.0)):
+                continue
             n, how = meeting_of(skin, lower, upper, d)
             if how[4] > real(0.0) and how[0] < how[1]:
                 stiff = stiffness_of(skin, lower, upper)
@@ -222,13 +240,14 @@ def make_push(space: Space, rubs: bool) -> Any:
 
 @functools.cache
 def make_rate(space: Space) -> Any:
-    """Kernel: the frequency of contact, of what is near enough to touch in the step, and the rate at which gaps close.
+    """Kernel: the largest frequency of contact, of what may touch in the step, or rate at which gaps close [1/s].
 
     The half cells between two particles are a spring of the stiffness A_a A_b φ K/r.
     """
     real, vec, SkinArrays, Particles = space.real, space.vec, skin_structure(space), structure(space, "Particles")
-    Rows, Clock, raise_rate = rows_structure(), clock_structure(space), raise_to(space.real)
+    Rows, raise_rate = rows_structure(), raise_to(space.real)
     meeting_of, stiffness_of, weight_of = meeting(space), stiffness(space), surface_weight(space)[0]
+    reaches = in_reach(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def rate(
@@ -238,7 +257,7 @@ def make_rate(space: Space) -> Any:
         x: wp.array(dtype=vec),
         v: wp.array(dtype=vec),
         particles: Particles,
-        clock: Clock,
+        largest: wp.array(dtype=real),
     ):
         k = first + wp.tid()
         a = skin.places[k]
@@ -246,6 +265,8 @@ def make_rate(space: Space) -> Any:
         closing = real(0.0)
         for i in range(rows.start[k], rows.start[k + 1]):
             b = skin.places[rows.index[i]]
+            if not reaches(skin, k, rows.index[i], x[b] - x[a], real(2.0)):
+                continue
             n, how = meeting_of(skin, k, rows.index[i], x[b] - x[a])
             weight = weight_of(how[2], how[3])
             if how[4] * weight > real(0.0) and how[0] < real(2.0) * how[1]:
@@ -255,6 +276,18 @@ def make_rate(space: Space) -> Any:
                 closing = wp.max(closing, wp.dot(v[a] - v[b], n) / gap)
         frequency = wp.max(wp.sqrt(square), closing * real(wp.static(2.0 / CLOSING)))
         if frequency > real(0.0):
-            raise_rate(clock.frequency, frequency)
+            raise_rate(largest, frequency)
 
     return rate
+
+
+@functools.cache
+def make_raise(space: Space) -> Any:
+    """Kernel of one thread: ask for a step by the frequency that was found."""
+    real, Clock = space.real, clock_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def raise_frequency(found: wp.array(dtype=real), clock: Clock):
+        clock.frequency[0] = wp.max(clock.frequency[0], found[0])
+
+    return raise_frequency

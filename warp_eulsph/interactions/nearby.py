@@ -174,6 +174,7 @@ class Nearby:
             self.rows.index = self._room(self.pairs + self.pairs // 4)
         if self.pairs:
             self._fill(True)
+            skin.want(self.rows.start)
         self._stale, self.searches = False, self.searches + 1
 
     def _fill(self, fill: bool) -> None:

@@ -10,6 +10,52 @@ from ..linalg import cofactor, inverse, symmetric_eigen
 from ..space import Space, difference
 from .faces import REACH, SPREAD, alike_vectors, least_two, surface_weight
 
+# Jacobi's sweeps: one rotation is exact in 2-D; in 3-D planes, one eigenvalue far from the others, take four.
+SWEEPS = {1: 0, 2: 1, 3: 4}
+
+
+@functools.cache
+def make_want(space: Space) -> Any:
+    """Kernel: which normals are asked for: those of particles that have others near them, in rows."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def want(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        start: wp.array(dtype=wp.int32),
+        wanted: wp.array(dtype=wp.int32),
+    ):
+        k = first + wp.tid()
+        wanted[members[k] - offset] = int(start[k + 1] > start[k])
+
+    return want
+
+
+@functools.cache
+def make_beside(space: Space) -> Any:
+    """Kernel: which outermost particles have one beside them whose normal is asked for, or are one."""
+    Neighbours = neighbour_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def find_beside(
+        first: int,
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        near: Neighbours,
+        outermost: wp.array(dtype=wp.int32),
+        wanted: wp.array(dtype=wp.int32),
+        beside: wp.array(dtype=wp.int32),
+    ):
+        k = first + wp.tid()
+        c = members[k] - offset
+        found = wanted[c]
+        for i in range(near.start[c], near.start[c + 1]):
+            found = wp.max(found, wanted[near.index[i]])
+        beside[k] = found * outermost[c]
+
+    return find_beside
+
 
 @functools.cache
 def make_normals(space: Space, fixed: bool) -> Any:
@@ -19,7 +65,12 @@ def make_normals(space: Space, fixed: bool) -> Any:
     moment, over their weight and spacing.
     """
     vec, mat, real, dim, separation = space.vec, space.mat, space.real, space.dim, difference(space)
-    weight_of, eigen, cof, invert = surface_weight(space)[0], symmetric_eigen(space), cofactor(space), inverse(space)
+    weight_of, eigen, cof, invert = (
+        surface_weight(space)[0],
+        symmetric_eigen(space, SWEEPS[space.dim]),
+        cofactor(space),
+        inverse(space),
+    )
     alike, order_of = alike_vectors(space), least_two(space)
     Particles, Reference, State, Neighbours = (
         structure(space, "Particles"),
@@ -39,6 +90,7 @@ def make_normals(space: Space, fixed: bool) -> Any:
         state: State,
         outward: wp.array(dtype=vec),
         outermost: wp.array(dtype=wp.int32),
+        wanted: wp.array(dtype=wp.int32),
         normals: wp.array(dtype=vec),
         centres: wp.array(dtype=vec),
         normal: wp.array(dtype=vec),
@@ -46,6 +98,8 @@ def make_normals(space: Space, fixed: bool) -> Any:
     ):
         k = first + wp.tid()
         a = members[k] - offset
+        if wanted[a] == 0:
+            return
         out = outward[a]
         turns = mat()
         if wp.static(fixed):
@@ -98,16 +152,17 @@ def make_lever(space: Space) -> Any:
         first: int,
         members: wp.array(dtype=wp.int32),
         offset: int,
-        there: wp.array(dtype=wp.int32),
+        wanted: wp.array(dtype=wp.int32),
         answer: wp.array(dtype=mat),
         slope: wp.array(dtype=vec),
         levers: wp.array(dtype=vec),
     ):
         k = first + wp.tid()
+        a = members[k] - offset
         lever = vec()
-        if there[k] == 1:
+        if wanted[a] == 1:
             lever = answer[k] @ slope[k]
-        levers[members[k] - offset] = lever
+        levers[a] = lever
 
     return find_lever
 
@@ -137,25 +192,28 @@ def make_turn(space: Space) -> Any:
         near: Neighbours,
         state: State,
         outward: wp.array(dtype=vec),
-        outermost: wp.array(dtype=wp.int32),
+        wanted: wp.array(dtype=wp.int32),
+        beside: wp.array(dtype=wp.int32),
         normals: wp.array(dtype=vec),
         centres: wp.array(dtype=vec),
         levers: wp.array(dtype=vec),
         out: wp.array(dtype=vec),
     ):
-        c = members[first + wp.tid()] - offset
-        force = vec()
-        if outermost[c] == 1:
+        k = first + wp.tid()
+        if beside[k] == 1:
+            c = members[k] - offset
             xi = -centres[c]
-            w = weight_of(real(0.0), real(REACH) * particles.spacing[c])
-            force = w * (levers[c] * wp.dot(normals[c], xi) + normals[c] * wp.dot(levers[c], xi))
+            force = vec()
+            if wanted[c] == 1:
+                w = weight_of(real(0.0), real(REACH) * particles.spacing[c])
+                force = w * (levers[c] * wp.dot(normals[c], xi) + normals[c] * wp.dot(levers[c], xi))
             for i in range(near.start[c], near.start[c + 1]):
                 a = near.index[i]
-                if outermost[a] == 1 and wp.length_sq(levers[a]) > real(0.0) and alike(outward[a], outward[c]):
+                if wanted[a] == 1 and alike(outward[a], outward[c]):
                     apart = separation(reference.x[c], reference.x[a], near.box)
                     w = weight_of(wp.length(apart), real(REACH) * particles.spacing[a])
                     xi = separation(state.x[c], state.x[a], near.box) / particles.spacing[a] - centres[a]
                     force += w * (levers[a] * wp.dot(normals[a], xi) + normals[a] * wp.dot(levers[a], xi))
-        out[c] = out[c] + force
+            out[members[k]] = out[members[k]] + force
 
     return turn

@@ -8,12 +8,11 @@ import warp as wp
 
 from ..boundaries import Assembly
 from ..boundaries.outermost import LARGE
-from ..execution import Launcher
-from ..fields import part_of
+from ..execution import Launcher, launch
 from ..space import Space
 from ..structs import StateArrays
 from .faces import make_area, make_find, make_outward
-from .normals import make_lever, make_normals, make_turn
+from .normals import make_beside, make_lever, make_normals, make_turn, make_want
 
 if TYPE_CHECKING:
     from ..scheme.medium import Medium
@@ -21,31 +20,39 @@ if TYPE_CHECKING:
 
 
 class _Layer:
-    """The skin of one medium; its outermost particles are those of the reference."""
+    """The skin of one medium; its outermost particles are those of the reference.
+
+    Attributes:
+        outermost: of all its particles, (n,) int32. outward: which way out is, (n,) of vec; zero in liquids.
+        changes: whether other particles may become outermost.
+    """
 
     def __init__(self, space: Space, medium: "Medium", device: Any):
         self.space, self.medium, self._launch = space, medium, Launcher(device)
         n = medium.n
         self.outermost = wp.zeros(n, dtype=wp.int32, device=device)
         fixed, exact = medium.configuration.fixed, medium.surface_given
+        flowing = np.zeros(n, dtype=np.int32)
+        for part in medium.flux.parts:
+            flows = not fixed and part.law.update is not None and part.law.rebase is None
+            flowing[part.first : part.first + part.size] = flows
+        self._flowing = wp.array(flowing, dtype=wp.int32, device=device)
         self.outward = medium.particles.outward
-        if not fixed and not exact:
+        if not fixed and (flowing.any() or not exact):
             self.outward = wp.zeros(n, dtype=space.vec, device=device)
+        self.changes = self.outward is not medium.particles.outward and not flowing.all()
         self.least = 0.0 if exact else LARGE
         self._normals, self._centres, self._levers = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
-
-    @property
-    def changes(self) -> bool:
-        """Whether other particles may become outermost."""
-        return self.outward is not self.medium.particles.outward
+        self.wanted = wp.zeros(n, dtype=wp.int32, device=device)
 
     def find(self) -> None:
         """Which are outermost in the present reference."""
         configuration, n = self.medium.configuration, self.medium.n
         if self.changes:
-            arguments = [configuration.fields, configuration.near, self.outward]
+            arguments = [configuration.fields, configuration.near, self._flowing, self.outward]
             self._launch(make_outward(self.space), n, arguments)
-        arguments = [self.medium.particles, configuration.fields, configuration.near, configuration.poor, self.outward]
+        arguments = [self.medium.particles, configuration.fields, configuration.near, configuration.poor]
+        arguments += [self._flowing, self.outward]
         self._launch(make_find(self.space), n, [*arguments, self.least, self.outermost])
 
     def areas(self, places: wp.array, there: wp.array, area: wp.array, bend: wp.array) -> None:
@@ -55,18 +62,27 @@ class _Layer:
 
     def normals(self, places: wp.array, state: StateArrays, normal: wp.array, answer: wp.array) -> None:
         """Which way out is of those at ``places``, by where the particles of ``state`` are."""
-        arguments = [*self._of(places), self.medium.of(state), self.outward, self.outermost]
+        arguments = [*self._of(places), self.medium.of(state), self.outward, self.outermost, self.wanted]
         arguments += [self._normals, self._centres, normal, answer]
         kernel = make_normals(self.space, self.medium.configuration.fixed)
         self._launch(kernel, len(places), arguments)
 
-    def turn(self, parts: list[wp.array], state: StateArrays, slope: wp.array, out: wp.array) -> None:
+    def want(self, places: wp.array, start: wp.array, beside: wp.array) -> None:
+        """Ask for the normals of those at ``places`` whose rows, from ``start`` on, are not empty."""
+        first = self.medium.span.start
+        device = self.wanted.device
+        launch(make_want(self.space), len(places), [places, first, start, self.wanted], device)
+        arguments = [places, first, self.medium.configuration.near, self.outermost, self.wanted, beside]
+        launch(make_beside(self.space), len(places), arguments, device)
+
+    def turn(
+        self, places: wp.array, answer: wp.array, beside: wp.array, state: StateArrays, slope: wp.array, out: wp.array
+    ) -> None:
         """Add the forces on particles by which normals answer the slopes ∂E/∂n of an energy."""
-        places, there, _, _, _, answer = parts
-        arguments = [places, self.medium.span.start, there, answer, slope, self._levers]
+        arguments = [places, self.medium.span.start, self.wanted, answer, slope, self._levers]
         self._launch(make_lever(self.space), len(places), arguments)
-        arguments = [*self._of(places), self.medium.of(state), self.outward, self.outermost]
-        arguments += [self._normals, self._centres, self._levers, part_of(out, self.medium.span)]
+        arguments = [*self._of(places), self.medium.of(state), self.outward, self.wanted, beside]
+        arguments += [self._normals, self._centres, self._levers, out]
         self._launch(make_turn(self.space), len(places), arguments)
 
     def _of(self, places: wp.array) -> list[Any]:
@@ -78,7 +94,8 @@ class Skin:
     """The outermost particles of bodies, in gathers that are the same on any number of threads.
 
     Where the arrangement stays that of the start, its outermost particles stay outermost, and the skin has them alone;
-    where it is read anew, every particle may be, and ``there`` says which are. An outermost particle lies half a
+    where it is read anew, every particle may be, and ``there`` says which are. Particles of liquids change places all
+    the time: all of them are, and have no normal. An outermost particle lies half a
     spacing beneath the surface; bodies are at least two particles thick.
 
     Args:
@@ -95,6 +112,7 @@ class Skin:
         half: distance from the particle to the surface, half a spacing [m], (k,).
         modulus, shear_modulus: ρ c² of pressure and of shear waves at F = I [Pa], (k,).
         normal: unit vector that points out, (k,) of vec, zero where a fragment has none; after ``look``.
+        slope: ∂E/∂n of each [J], (k,) of vec, of an energy that depends on normals; for ``turn``.
         bend: how far the particles around are from a plane in the reference, 0 flat to 1 (k,): least over next
             eigenvalue of their second moment; about ½ in corners. Where it is 1 the normal tells nothing.
 
@@ -136,15 +154,15 @@ class Skin:
         self.modulus, self.shear_modulus = (wp.array(M, dtype=world.space.real, device=device) for M in moduli.T)
         self.there = wp.zeros(k, dtype=wp.int32, device=device)
         self.area, self.bend = (wp.zeros(k, dtype=world.space.real, device=device) for _ in range(2))
-        self.normal = wp.zeros(k, dtype=world.space.vec, device=device)
+        self.normal, self.slope = (wp.zeros(k, dtype=world.space.vec, device=device) for _ in range(2))
+        self._beside = wp.full(k, 1, dtype=wp.int32, device=device)
         self._answer = wp.zeros(k, dtype=world.space.mat, device=device)
-        self._parts = [
-            [part_of(array, own) if len(own) else array[:0] for array in self._arrays()] for own in self._spans
-        ]
+        self._parts = [[array[own.start : own.stop] for array in self._arrays()] for own in self._spans]
         self.find()
+        self.want(wp.array(np.arange(k + 1), dtype=wp.int32, device=device))  # all of them, until somebody knows better
 
     def _arrays(self) -> list[wp.array]:
-        return [self.places, self.there, self.area, self.bend, self.normal, self._answer]
+        return [self.places, self.there, self.area, self.bend, self.normal, self.slope, self._answer, self._beside]
 
     @property
     def changes(self) -> bool:
@@ -159,15 +177,24 @@ class Skin:
     def find(self) -> None:
         """Which particles are outermost in the present references, and the face of each; launches only."""
         self.find_layers()
-        for layer, (places, there, area, bend, _, _) in zip(self._layers, self._parts, strict=True):
+        for layer, (places, there, area, bend, *_) in zip(self._layers, self._parts, strict=True):
             layer.areas(places, there, area, bend)
+
+    def want(self, start: wp.array) -> None:
+        """Have ``look`` find the normals of those alone that have something near them; launches only.
+
+        Args:
+            start: where the row of each begins, (k + 1,) int32; what has an empty row needs no normal.
+        """
+        for layer, parts, own in zip(self._layers, self._parts, self._spans, strict=True):
+            layer.want(parts[0], start[own.start : own.stop + 1], parts[-1])
 
     def look(self, state: StateArrays) -> None:
         """Normals of the skin where the particles are in ``state`` (struct ``State``); launches only."""
-        for layer, (places, _, _, _, normal, answer) in zip(self._layers, self._parts, strict=True):
+        for layer, (places, _, _, _, normal, _, answer, _) in zip(self._layers, self._parts, strict=True):
             layer.normals(places, state, normal, answer)
 
-    def turn(self, state: StateArrays, slope: wp.array, out: wp.array) -> None:
+    def turn(self, state: StateArrays, out: wp.array) -> None:
         """Add the forces [N] of an energy that depends on the normals of the last look to ``out``, (n,) of vec.
 
         They are −∂E/∂n · ∂n/∂x: with them forces are those of the energy, and have no moment where it does not change
@@ -175,9 +202,9 @@ class Skin:
 
         Args:
             state: that of the look.
-            slope: ∂E/∂n of each of the skin [J], (k,) of vec.
-            out: forces.
+            out: forces; ``slope`` holds ∂E/∂n.
         """
         if self.space.dim > 1:
-            for layer, parts, own in zip(self._layers, self._parts, self._spans, strict=True):
-                layer.turn(parts, state, part_of(slope, own) if len(own) else slope[:0], out)
+            for layer, parts in zip(self._layers, self._parts, strict=True):
+                places, _, _, _, _, slope, answer, beside = parts
+                layer.turn(places, answer, beside, state, slope, out)

@@ -2,10 +2,13 @@
 
 from .bar import Bar
 from .base import Law, Material, Variable
+from .damage import Failure, JohnsonCookFailure, PlasticStrain, PrincipalStrain, PrincipalStress
+from .failing import Failing
 from .fluid import Fluid
 from .hardening import Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
 from .j2 import J2
 from .linear_elastic import LinearElastic
+from .mie_gruneisen import MieGruneisen
 from .mooney_rivlin import MooneyRivlin
 from .nearly_incompressible import NearlyIncompressible
 from .neo_hookean import NeoHookean
@@ -18,20 +21,27 @@ from .viscosity import Newtonian, PowerLaw, Viscosity
 __all__ = [
     "J2",
     "Bar",
+    "Failing",
+    "Failure",
     "Fluid",
     "Hardening",
     "IdealGas",
     "JohnsonCook",
+    "JohnsonCookFailure",
     "Law",
     "LinearElastic",
     "LinearHardening",
     "Material",
+    "MieGruneisen",
     "MooneyRivlin",
     "NearlyIncompressible",
     "NeoHookean",
     "NeoHookeanLog",
     "Newtonian",
+    "PlasticStrain",
     "PowerLaw",
+    "PrincipalStrain",
+    "PrincipalStress",
     "SaintVenantKirchhoff",
     "StiffenedGas",
     "Tabulated",

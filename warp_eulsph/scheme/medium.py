@@ -12,6 +12,7 @@ from ..fields import part, part_of
 from ..space import Space
 from ..structs import ClockArrays, ForceArrays, ParticleArrays, StateArrays
 from .base import Scheme
+from .breaking import Breaking
 from .dissipation import UpwindForces
 from .dual_forces import DualForces
 from .flux import Flux
@@ -25,6 +26,7 @@ from .sharpening import Sharpener
 from .shifting import Shifter
 from .stabiliser import Stabiliser, Sums
 from .updates import make_drift, make_kick, make_mean, make_predict
+from .volume_flux import VolumeFlux
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ class Medium:
     Attributes:
         surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
-        heating: None where no law takes heat.
+        breaking, heating, volumes: None where no law fails, none takes heat, no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
     """
@@ -114,6 +116,8 @@ class Medium:
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
+        breaks = any(part.law.failed is not None for part in self.flux.parts)
+        self.breaking = Breaking(space, self.flux, self.configuration, device) if breaks else None
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:
             self.limiter = options.limiter.build(space, self.particles, self.configuration, device)
@@ -121,6 +125,7 @@ class Medium:
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
         self.heating: Heating | None = None
+        self.volumes: VolumeFlux | None = None
         self.smoothed_F_k = self.configuration.fields.F
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
@@ -153,10 +158,20 @@ class Medium:
         """Whether its dissipation heats a law of its bodies."""
         return self.options.dissipation is not None and any(part.law.heat is not None for part in self.flux.parts)
 
-    def take_heat(self, heat: wp.array, v_old: wp.array) -> None:
-        """See the own particles of the world's heat [J] and of the velocities [m/s] before the step."""
-        own = part_of(heat, self.span), part_of(v_old, self.span)
-        self.heating = Heating(self.space, self.flux, self.particles, *own, self.device)
+    @property
+    def exchanges(self) -> bool:
+        """Whether volume flows between its pairs."""
+        upwind = self.options.dissipation
+        return upwind is not None and upwind.volume and self.flux.forgets and not self.policy.fixed
+
+    def take_scratch(self, scratch: wp.array, v_old: wp.array) -> None:
+        """See the own particles of the world's scratch and of the velocities [m/s] before the step."""
+        own, before = part_of(scratch, self.span), part_of(v_old, self.span)
+        if self.heats:
+            self.heating = Heating(self.space, self.flux, self.particles, own, before, self.device)
+        if self.exchanges:
+            self.flux.keep_dissipated()
+            self.volumes = VolumeFlux(self.space, self.flux, self.particles, own, self.device)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -204,6 +219,8 @@ class Medium:
         """Derive what the evolving arrays determine, after they were overwritten."""
         self.configuration.rebuild()
         self._derive()
+        if self.breaking is not None:
+            self.breaking.rebuild()
 
     def _derive(self) -> None:
         self.configuration.resolve()
@@ -314,6 +331,8 @@ class Medium:
     def update(self, state: StateArrays) -> None:
         """Histories after a full step, and what materials keep of F: liquids J only."""
         self.flux.update(self.of(state).F, self.grad_v, self.configuration, self.clock)
+        if self.breaking is not None:
+            self.breaking.update(self.of(state).F)
 
     def find_heat(self, state: StateArrays) -> None:
         """What M9 took in the step that ended in ``state``, particle by particle."""
@@ -325,11 +344,23 @@ class Medium:
         if self.heating is not None:
             self.heating.take(self.of(state).F, self.clock)
 
+    def find_exchange(self) -> None:
+        """What volume flows between pairs (M24)."""
+        if self.volumes is not None:
+            self.volumes.find(self.sums, self.clock)
+
+    def exchange(self, state: StateArrays) -> None:
+        """That volume into J."""
+        if self.volumes is not None:
+            self.volumes.take(self.of(state).F)
+
     def evolving(self) -> dict[str, wp.array]:
         """Every array of its own that a step reads before it writes it, by name."""
         parts = [self.configuration.evolving(), self.flux.evolving(), self.stabiliser.evolving()]
         if self.shifter is not None:
             parts.append(self.shifter.evolving())
+        if self.breaking is not None:
+            parts.append(self.breaking.evolving())
         return {name: array for held in parts for name, array in held.items()}
 
     def _smooth_field(self, f: wp.array, gradient: wp.array, out: wp.array) -> None:
