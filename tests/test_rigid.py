@@ -11,6 +11,9 @@ import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.geometry import box
 from warp_eulsph.interactions import Box, Cylinder, Driven, Free, Held, Moving, Plane, RigidBody, Sphere, traces
+from warp_eulsph.output import Recording, record
+from warp_eulsph.output.record import ChangedCaseError
+from warp_eulsph.schedule import AtTimes
 
 ELASTIC = es.LinearElastic(density=1.0, young=1.0, poisson=0.0)  # c = 1
 FLOOR = RigidBody(Plane((0.0, 1.0)), name="floor")
@@ -122,6 +125,25 @@ def test_a_block_rests_under_its_weight():
     assert np.abs(simulation.v).max() < 1e-3
     energy = simulation.energy()
     assert energy["interaction"] < 1e-3 * energy["external"]
+
+
+@pytest.mark.slow
+def test_a_block_rests_for_a_hundred_thousand_steps():
+    """Without damping but the scheme's own: no drift, no gain, and motion dies out."""
+    x, volume = box(lower=(0.0, 0.0), upper=(1.0, 0.5), spacing=0.1)
+    simulation = es.Simulation(
+        es.Body(x=x, volume=volume, material=RUBBER), boundaries=[es.Gravity()], interactions=[FLOOR]
+    )
+    simulation.step(20_000)
+    before = simulation.energy()
+    simulation.step(80_000)
+    after = simulation.energy()
+    centre = simulation.x.mean(axis=0)
+    assert abs(centre[0] - 0.5) < 1e-12
+    assert 0.2499 < centre[1] < 0.25
+    assert after["kinetic"] < before["kinetic"] < 1e-6 * before["external"]
+    assert before["total"] * (1.0 - 1e-3) < after["total"] < before["total"]
+    assert after["interaction"] == pytest.approx(before["interaction"], abs=1e-7 * before["total"])
 
 
 def far_away(dim, **options):
@@ -252,6 +274,22 @@ def test_resumed_runs_go_on_bit_for_bit():
     whole.step(20)
     resumed.step(20)
     assert bits(resumed) == bits(whole)
+
+
+def test_recorded_runs_go_on_and_know_their_rigid_bodies(tmp_path):
+    def run(directory, until, radius=0.25):
+        simulation = dropped()
+        ball = dataclasses.replace(simulation.interactions[0], shape=Sphere(radius), friction=0.2)
+        simulation = es.Simulation(simulation.bodies, interactions=[ball])
+        record(simulation, directory, until, Recording(snapshots=AtTimes([0.004, 0.006])), resume=True)
+        return simulation
+
+    whole = run(tmp_path / "whole", 0.006)
+    run(tmp_path / "parts", 0.004)
+    assert bits(run(tmp_path / "parts", 0.006)) == bits(whole)
+    assert rigid(whole).force.any()
+    with pytest.raises(ChangedCaseError, match=r"interactions.0.shape.radius: 0.25, now 0.2"):
+        run(tmp_path / "parts", 0.01, radius=0.2)
 
 
 def test_a_disc_in_a_hollow_box_bounces_about():
