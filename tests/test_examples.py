@@ -158,3 +158,9 @@ def test_table_of_figures():
     lines = table(figures).splitlines()
     assert [line.split()[-1] for line in lines[1:]] == ["ok", "OUTSIDE", "OUTSIDE", "ok"]
     assert lines[1].split() == ["inside", "1.5", "1.6", "1", "to", "2", "ok"]
+
+
+@pytest.mark.parametrize(("name", "n"), [("shock_tube", "100"), ("taylor_green", "32")])
+def test_fluids(run, name, n):
+    figures, frames = run(name, "-n", n)
+    assert frames == 11 and len(figures) >= 5

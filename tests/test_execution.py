@@ -1,8 +1,10 @@
 """How kernels run changes nothing: threads keep every bit, SIMD kernels equal the portable ones up to round-off."""
 
 import os
+import platform
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -223,3 +225,34 @@ def test_defaults_are_all_cores_and_simd():
     environment = {**os.environ, "WARP_EULSPH_THREADS": "3", "WARP_EULSPH_SIMD": "0"}
     shown = subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout
     assert shown.split()[-2:] == ["3", "False"]
+
+
+CPUINFO = Path("/proc/cpuinfo")
+BLOCK = """
+import sys
+import warp as wp
+
+wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", sys.argv[1])
+import dataclasses
+import numpy as np
+from warp_eulsph.bench.cases import CASES
+
+case = next(case for case in CASES if case.name == "eulerian-3d-float64")
+simulation = dataclasses.replace(case, side=6).build()
+simulation.step(3)
+np.save(sys.argv[2], simulation.v)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (platform.machine() == "x86_64" and CPUINFO.exists()), reason="names processors of that kind")
+def test_older_processors_find_the_same(tmp_path):
+    """Without AVX-512 and without any AVX, by the code that is compiled for them: up to round-off, FMA or not."""
+    found = []
+    for k, target in enumerate(("-march=native", "-target-cpu haswell", "-target-cpu x86-64")):
+        if "haswell" in target and "avx2" not in CPUINFO.read_text():
+            continue
+        subprocess.run([sys.executable, "-c", BLOCK, target, tmp_path / f"{k}.npy"], check=True, capture_output=True)
+        found.append(np.load(tmp_path / f"{k}.npy"))
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=0.0, atol=1e-11 * np.abs(found[0]).max())

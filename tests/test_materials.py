@@ -24,6 +24,7 @@ from warp_eulsph.space import Space
 RUBBER = {"density": 1100.0, "young": 17e6, "poisson": 0.45}
 # A value for every parameter that any material declares, all for rubber of shear modulus 5.8621e6 Pa, ν = 0.45.
 PARAMETERS = {**RUBBER, "shear": 5.862069e6, "bulk": 5.666667e7, "c10": 2.0e6, "c01": 0.9310345e6}
+PARAMETERS |= {"slope": 1.1, "gruneisen": 1.8}
 PARAMETERS |= {"stiffness": 1100.0 * 242.1**2 / 7.0, "pressure": 1100.0 * 242.1**2 / 1.4}
 PARAMETERS |= {"sound_speed": 242.1, "gamma": 7.0, "hardening": materials.LinearHardening(yield_stress=1e6)}
 
@@ -118,7 +119,7 @@ def elasticity(material: Material, space: Space, F: np.ndarray) -> np.ndarray:
 
 def analytic_moduli(material: Material, space: Space) -> tuple[float, float]:
     """Pressure- and shear-wave moduli [Pa] of small strains, from textbook formulas."""
-    if isinstance(material, materials.TaitLiquid):
+    if isinstance(material, materials.TaitLiquid | materials.MieGruneisen):
         return material.density * material.sound_speed**2, 0.0
     if isinstance(material, materials.StiffenedGas):
         return material.gamma * (material.pressure + material.stiffness), 0.0

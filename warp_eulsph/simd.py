@@ -68,6 +68,7 @@ def prelude(space: Space) -> str:
     """
     wide = space.real is wp.float64
     masked = f"__builtin_ia32_loadup{'d256' if wide else 's128'}_mask"
+    lanes = f"__builtin_ia32_maskloadp{'d256' if wide else 's'}"
     image = ""
     if space.periodic:
         image = f"""
@@ -96,6 +97,10 @@ def prelude(space: Space) -> str:
     #if defined(__AVX512VL__) && __has_builtin({masked})
         typedef T M __attribute__((__vector_size__(4 * sizeof(T))));
         return (Q){masked}((const M*)p, M{{}}, (1 << dim) - 1);
+    #elif defined(__AVX__) && __has_builtin({lanes})
+        typedef {"long long" if wide else "int"} N __attribute__((__vector_size__(4 * sizeof(T))));
+        typedef T M __attribute__((__vector_size__(4 * sizeof(T))));
+        return (Q){lanes}((const M*)p, N{{-1, -(dim > 1), -(dim > 2), 0}});
     #else
         Q q = 0;
         #pragma unroll

@@ -6,6 +6,7 @@ from .fluid import Fluid
 from .hardening import Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
 from .j2 import J2
 from .linear_elastic import LinearElastic
+from .mie_gruneisen import MieGruneisen
 from .mooney_rivlin import MooneyRivlin
 from .nearly_incompressible import NearlyIncompressible
 from .neo_hookean import NeoHookean
@@ -26,6 +27,7 @@ __all__ = [
     "LinearElastic",
     "LinearHardening",
     "Material",
+    "MieGruneisen",
     "MooneyRivlin",
     "NearlyIncompressible",
     "NeoHookean",

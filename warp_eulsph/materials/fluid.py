@@ -250,11 +250,13 @@ def _remembering(
     def update(F: mat, rate: mat, h: row, dt: real, c: Constants):
         out = h
         lost = real(0.0)
+        if wp.static(heated):  # not a number where the equation of state has no pressure
+            out[0] = h[0] + real(0.0) * pressure(determinant(F), h[0], c)
         if wp.static(viscous):
             shear = eta_of(rate, c)
             work = determinant(F) * shear[0] * shear[1] * dt
             if wp.static(heated):
-                out = warmed(F, h, work, c)
+                out = warmed(F, out, work, c)
             else:
                 lost = work
             out[last] = h[last] + work

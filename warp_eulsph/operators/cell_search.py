@@ -12,19 +12,31 @@ MARGIN = 1.001
 # Columns of cells that a particle reaches into, at most four along two axes; where there are more, in several goes.
 MOST_RUNS = 16
 
-_TYPES = """
+# Of each choice of eight the numbers of the chosen ones, a byte each from the lowest on.
+_CHOSEN = ", ".join(
+    f"{sum(i << (8 * k) for k, i in enumerate(i for i in range(8) if bits >> i & 1))}ull" for bits in range(256)
+)
+
+_TYPES = f"""
     typedef T X __attribute__((ext_vector_type(8)));
     typedef int I __attribute__((ext_vector_type(8)));
     typedef bool B __attribute__((ext_vector_type(8)));
     // write the chosen ones of eight; up to eight places are overwritten
-    auto append = [](int* to, I b, unsigned char bits) __attribute__((always_inline)) {
+    auto append = [](int* to, I b, unsigned char bits) __attribute__((always_inline)) {{
     #if defined(__AVX512VL__)
-        b = (I)__builtin_ia32_compresssi256_mask(b, I{}, bits);
+        b = (I)__builtin_ia32_compresssi256_mask(b, I{{}}, bits);
+        __builtin_memcpy(to, &b, sizeof(I));
+    #elif defined(__AVX2__)
+        static const unsigned long long chosen[256] = {{{_CHOSEN}}};
+        typedef unsigned char Bytes __attribute__((ext_vector_type(8)));
+        Bytes which;
+        __builtin_memcpy(&which, chosen + bits, sizeof(Bytes));
+        b = (I)__builtin_ia32_permvarsi256(b, __builtin_convertvector(which, I));
         __builtin_memcpy(to, &b, sizeof(I));
     #else
         for (; bits; bits &= bits - 1) *to++ = b[__builtin_ctz(bits)];
     #endif
-    };
+    }};
 """
 # C++ of one particle's search: ``found(b, bits)`` is called with eight candidates b, and a bit for each of
 # them that is a neighbour.

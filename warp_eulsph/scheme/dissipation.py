@@ -27,11 +27,14 @@ class Upwind:
         stress: whether what the forces do to gradients goes through the stress, where the arrangement does not move:
             angular momentum is exact then, and smooth waves lose less: too little for the midpoint rule (M8), and for
             shocks and waves that a few particles must carry.
+        volume: whether volume flows between pairs too, from high to low pressure (M24), in bodies that carry J alone:
+            without it nothing holds pressures of neighbouring layers together, and they part in liquids at rest.
     """
 
     epsilon: float = 1.0
     sensor: Sensor | None = None
     stress: bool = False
+    volume: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.epsilon <= 2.0:

@@ -307,6 +307,7 @@ class Flux:
     Attributes:
         kinds: the bodies by kinds of law, in their order. parts: the bodies with their laws and histories.
         bodies: particle indices of each body.
+        forgets: every body carries J alone.
     """
 
     def __init__(
@@ -321,6 +322,7 @@ class Flux:
         empty = ["Pi", "tie", "drag", "secant", "tied", "slipped"] + ([] if remembers else ["dissipated"])
         self.fields: FluxArrays = allocate(space, "Flux", n, device, empty=empty)
         self.bodies = [range(part.first, part.first + part.size) for part in self.parts]
+        self.forgets = all(material.forgets for material, _ in bodies)
 
     def evolving(self) -> dict[str, wp.array]:
         """The histories of the bodies that have one, and what yielding left of the tie; what a checkpoint must hold."""
@@ -331,6 +333,11 @@ class Flux:
         """Have ``compute`` write Π too, for forces that take it from the array (M5)."""
         if not len(self.fields.Pi):
             self.fields.Pi = wp.zeros_like(self.fields.Q)
+
+    def keep_dissipated(self) -> None:
+        """Have the ledger read ``fields.dissipated``, which others than the laws write to."""
+        if not len(self.fields.dissipated):
+            self.fields.dissipated = wp.zeros_like(self.fields.speed)
 
     def moduli(self) -> list[tuple[float, float]]:
         """Moduli of pressure and of shear waves at F = I [Pa] of each body; reads the device."""

@@ -1,7 +1,6 @@
 """Heat of the dissipation (M9), particle by particle, into laws that take it: what shocks need."""
 
 import functools
-import math
 
 import warp as wp
 
@@ -14,6 +13,7 @@ from ..space import Space, difference
 from ..structs import ClockArrays, ParticleArrays
 from .dissipation import jump_between, upwind
 from .flux import Flux
+from .shifting import NO_BOUND
 from .stabiliser import Sums
 
 
@@ -67,7 +67,7 @@ def _make_take(space: Space, law: Law) -> wp.Kernel:
     A particle whose history is not finite, or below what its variables can be, is bad.
     """
     real, mat, row, length = space.real, space.mat, history_row(space, law), len(law.start)
-    least = row(*[-math.inf if v.least is None else v.least for v in law.history for _ in v.values])
+    least = row(*[NO_BOUND if v.least is None else v.least for v in law.history for _ in v.values])
     Particles, Flux, Clock = structure(space, "Particles"), structure(space, "Flux"), clock_structure(space)
     Constants, warmed = law.Constants, law.heat
 

@@ -25,6 +25,7 @@ from .sharpening import Sharpener
 from .shifting import Shifter
 from .stabiliser import Stabiliser, Sums
 from .updates import make_drift, make_kick, make_mean, make_predict
+from .volume_flux import VolumeFlux
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class Medium:
     Attributes:
         surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
-        heating: None where no law takes heat.
+        heating: None where no law takes heat. volumes: None where no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
     """
@@ -121,6 +122,7 @@ class Medium:
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
         self.heating: Heating | None = None
+        self.volumes: VolumeFlux | None = None
         self.smoothed_F_k = self.configuration.fields.F
         if smoothing is not None and smoothing.smooths_reference and not self.policy.fixed:
             self.smoothed_F_k = wp.zeros(n, dtype=space.mat, device=device)
@@ -153,10 +155,20 @@ class Medium:
         """Whether its dissipation heats a law of its bodies."""
         return self.options.dissipation is not None and any(part.law.heat is not None for part in self.flux.parts)
 
-    def take_heat(self, heat: wp.array, v_old: wp.array) -> None:
-        """See the own particles of the world's heat [J] and of the velocities [m/s] before the step."""
-        own = part_of(heat, self.span), part_of(v_old, self.span)
-        self.heating = Heating(self.space, self.flux, self.particles, *own, self.device)
+    @property
+    def exchanges(self) -> bool:
+        """Whether volume flows between its pairs."""
+        upwind = self.options.dissipation
+        return upwind is not None and upwind.volume and self.flux.forgets and not self.policy.fixed
+
+    def take_scratch(self, scratch: wp.array, v_old: wp.array) -> None:
+        """See the own particles of the world's scratch and of the velocities [m/s] before the step."""
+        own, before = part_of(scratch, self.span), part_of(v_old, self.span)
+        if self.heats:
+            self.heating = Heating(self.space, self.flux, self.particles, own, before, self.device)
+        if self.exchanges:
+            self.flux.keep_dissipated()
+            self.volumes = VolumeFlux(self.space, self.flux, self.particles, own, self.device)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -324,6 +336,16 @@ class Medium:
         """That heat into the laws."""
         if self.heating is not None:
             self.heating.take(self.of(state).F, self.clock)
+
+    def find_exchange(self) -> None:
+        """What volume flows between pairs (M24)."""
+        if self.volumes is not None:
+            self.volumes.find(self.sums, self.clock)
+
+    def exchange(self, state: StateArrays) -> None:
+        """That volume into J."""
+        if self.volumes is not None:
+            self.volumes.take(self.of(state).F)
 
     def evolving(self) -> dict[str, wp.array]:
         """Every array of its own that a step reads before it writes it, by name."""

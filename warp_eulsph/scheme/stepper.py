@@ -121,13 +121,22 @@ class Stepper(World, ABC):
     def _update(self, state: StateArrays) -> None:
         for medium in self.media:
             medium.update(state)
-        if self.heated:
-            for medium in self.media:
+        if self.exchanging:  # M24
+            for medium in self.exchanging:
+                medium.find_exchange()
+            self._reflect()
+            for medium in self.exchanging:
+                medium.exchange(state)
+        if self.heated:  # M21
+            for medium in self.heated:
                 medium.find_heat(state)
-            for condition in self.conditions:
-                condition.reflect(self.heat)
-            for medium in self.media:
+            self._reflect()
+            for medium in self.heated:
                 medium.heat(state)
+
+    def _reflect(self) -> None:
+        for condition in self.conditions:
+            condition.reflect(self.scratch)
 
     def _check(self, state: StateArrays) -> None:
         check(self._launch, self.space, state, self.clock.fields)

@@ -79,7 +79,8 @@ class World:
         media: in the order of the particles. conditions: imposed in this order.
         interactions: between the media; ``exchanged``: the forces [N] of each, (n,) of vec.
         forces, grad_v: of the last step. clock: time on the device. ledger: where the energy went. steps: taken so far.
-        heated: the media whose dissipation heats. heat: that of the last step [J], (n,).
+        heated: the media whose dissipation heats; exchanging: between whose pairs volume flows. scratch: what one of
+            these leaves in a step, (n,).
     """
 
     #: Whether steps leave ∇_k v^{n+1} for the next one, in media where conditions are steady and nothing limits v.
@@ -111,9 +112,10 @@ class World:
         self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
         self.heated = [medium for medium in self.media if medium.heats]
-        self.heat = wp.zeros(n if self.heated else 0, dtype=space.real, device=device)
-        for medium in self.heated:
-            medium.take_heat(self.heat, self.ledger.v_old)
+        self.exchanging = [medium for medium in self.media if medium.exchanges]
+        self.scratch = wp.zeros(n if self.heated or self.exchanging else 0, dtype=space.real, device=device)
+        for medium in self.media:
+            medium.take_scratch(self.scratch, self.ledger.v_old)
 
     def _allocate_forces(self) -> ForceArrays:
         """Struct ``Forces``, where those that are always zero take the memory of one."""
