@@ -48,7 +48,7 @@ def test_a_block_slides_with_friction(form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_block_sticks_without_creep(form):
-    """Below the angle of friction it shears, and slips as its weight comes on, a hundredth of a spacing; then it stays."""
+    """Below the angle of friction it shears, and slips as its weight comes on, a hundredth of a spacing, and stays."""
     simulation = on_incline(0.7, **FORMS[form])
     simulation.run(0.12)
     moved = [simulation.displacement[:, 0].mean() for _ in simulation.frames(np.linspace(0.14, 0.52, 20))]
