@@ -52,7 +52,7 @@ def measure(simulation: es.Simulation, speed: float, writer: SnapshotWriter) -> 
 
 
 def figures(history: History, simulation: es.Simulation, speed: float) -> list[Figure]:
-    """Momenta to round-off and nearly so; the contact's account, the error of the steps; what comes back."""
+    """Momentum to round-off; the contact's account, the error of the steps; spin, which dissipation takes some of."""
     start, v = history["total"][0], speed * WAVE_SPEED
     scale = v * simulation.particles.mass.numpy().sum()
     turned = np.abs(history["spin"] - history["spin"][0]).max() / (0.1 * scale)
@@ -61,7 +61,7 @@ def figures(history: History, simulation: es.Simulation, speed: float) -> list[F
         Figure("kinetic and stored energy, end / start", history["total"][-1] / start, 0.4, 1.0, 1.0),
         Figure("taken by the contact / energy", history["interaction"][-1] / start, -0.01, 0.002, 0.0),
         Figure("momentum / (mass speed)", history["momentum"].max() / scale, 0.0, 1e-12, 0.0),
-        Figure("angular momentum, change / start", turned, 0.0, 1e-2, 0.0),
+        Figure("angular momentum, change / start", turned, 0.0, 0.02, 0.0),
         Figure("ledger residual / energy", abs(simulation.energy()["residual"]) / start, 0.0, 1e-11, 0.0),
     ]
 

@@ -239,6 +239,27 @@ def test_a_square_hits_a_face(angle, speed, arrangement):
     assert np.abs(simulation.momentum() - momentum).max() < 1e-12 * np.abs(momentum).max()
 
 
+@pytest.mark.parametrize("speed", [2.0, 8.0])
+def test_a_drop_on_a_block(speed):
+    """Water splashes on rubber: no particle gets in, and the contact takes and makes no energy."""
+    h = 0.05
+    block = es.Body(x=rectangle(40, 8, h), volume=h * h, material=SOFT, name="block")
+    x, volume = disc(centre=(1.0, 0.72), radius=0.3, spacing=h)
+    water = es.TaitLiquid(density=1000.0, sound_speed=50.0)
+    drop = es.Body(x=x, volume=volume, material=water, velocity=(0.0, -speed), name="drop")
+    held = es.Fixed(lambda X: X[:, 1] < h, body="block")
+    simulation = es.Simulation([block, drop], interactions=[es.Contact()], boundaries=[held])
+    start = simulation.energy()["total"]
+    for _ in simulation.frames(np.linspace(0.04, 0.3, 5) / speed):
+        own, others = simulation.x[320:], simulation.x[:320]
+        beneath = [others[abs(others[:, 0] - place[0]) < h, 1].max(initial=-1.0) for place in own]
+        assert (own[:, 1] > np.array(beneath) + 0.25 * h).all()
+        energy = simulation.energy()
+        assert abs(energy["interaction"]) < 0.003 * start
+        assert abs(energy["residual"]) < 1e-11 * start
+    assert mean_velocity(simulation, "drop")[1] > -0.6 * speed
+
+
 @REFERENCES
 def test_a_thin_plate_hit_on_both_sides(arrangement):
     """Two particles thick, between two discs of the same momentum: symmetric, and nobody passes."""

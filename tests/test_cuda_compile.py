@@ -13,7 +13,7 @@ from cubin import usage
 import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.interactions import Free, Sphere
-from warp_eulsph.materials import J2, JohnsonCook
+from warp_eulsph.materials import J2, IdealGas, JohnsonCook, MieGruneisen, Newtonian
 
 CASES = [
     pytest.param(3, wp.float32, 90),
@@ -24,7 +24,7 @@ CASES = [
 
 
 def problems(dim, dtype):
-    """Simulations whose steps launch all kinds of kernels: of the forms of the scheme, and of matter that yields."""
+    """Simulations whose steps launch all kinds of kernels: of the forms of the scheme, of what yields or flows."""
     body, fixed = block(dim, 5), es.Fixed(lambda X: X[:, 0] < 0.2)
     for scheme, reference in (
         (es.Verlet(), es.Always()),
@@ -41,6 +41,12 @@ def problems(dim, dtype):
     place = [0.5] * (dim - 1) + [1.51]
     ball = es.RigidBody(Sphere(0.5), centre=place, motion=Free(mass=10.0, gravity=9.81), friction=0.3)
     yield es.Simulation(body, interactions=[ball], dtype=dtype)
+    gas = IdealGas(density=1.2, pressure=1e5, viscosity=Newtonian(viscosity=1.0), cavitation=1e3)
+    metal = MieGruneisen(density=8930.0, sound_speed=3940.0, slope=1.489, gruneisen=1.99)
+    upwind = es.Upwind(sensor=es.DimensionlessSensor(), volume=True)
+    for law in (gas, metal):
+        flowing = dataclasses.replace(body, material=law, velocity=10.0 * body.x)
+        yield es.Simulation(flowing, boundaries=[fixed], scheme=es.Verlet(dissipation=upwind), dtype=dtype)
 
 
 @pytest.mark.parametrize(("dim", "dtype", "arch"), CASES)

@@ -15,7 +15,16 @@ EQUATIONS = set(re.findall(r"\((M\d+)\)", METHOD))
 
 
 # Files that runs and users make.
-OF_USERS = {"ciarlet.py", "foam.py", "plate.toml", "rigid_floor.py", "case.toml", "DIR/case.toml", "mine.toml"}
+OF_USERS = {
+    "ciarlet.py",
+    "foam.py",
+    "brittle.py",
+    "plate.toml",
+    "rigid_floor.py",
+    "case.toml",
+    "DIR/case.toml",
+    "mine.toml",
+}
 
 
 def ids(path):
@@ -23,7 +32,7 @@ def ids(path):
 
 
 def test_all_equations_are_defined():
-    assert {f"M{k}" for k in range(1, 25)} == EQUATIONS
+    assert {f"M{k}" for k in range(1, 26)} == EQUATIONS
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=ids)

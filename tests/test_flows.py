@@ -10,6 +10,7 @@ from fluid_laws import COPPER, GAS, OIL, THICK, WATER, long_law
 from scipy.optimize import brentq
 
 import warp_eulsph as es
+from warp_eulsph.cases import read_case
 from warp_eulsph.geometry import box
 from warp_eulsph.interactions import Plane, RigidBody
 from warp_eulsph.materials import IdealGas, Newtonian, TaitLiquid
@@ -261,6 +262,34 @@ def test_wall_that_moves_out_of_its_plane_is_named():
     body = es.Body(x=lattice(2, 6), volume=1 / 36, material=OIL)
     with pytest.raises(ValueError, match=r"a wall must move within its plane, \(2,\), got the velocity \(0.0, 1.0\)"):
         es.mirror(body, point=(0.0, 0.0), normal=(0.0, -1.0), depth=0.5, image=es.NoSlip((0.0, 1.0)))
+
+
+CASE = """
+until = 1e-3
+periodic = [1.0, 0.0]
+scheme = { kind = "Verlet", dissipation = { epsilon = 0.5, volume = true } }
+[body.oil.material]
+kind = "TaitLiquid"
+density = 900.0
+sound_speed = 20.0
+cavitation = -100.0
+viscosity = { kind = "Newtonian", viscosity = 1.0 }
+[body.oil]
+mirror = [{ point = [0.0, 0.0], normal = [0.0, -1.0], image = { kind = "NoSlip", velocity = [0.1, 0.0] } }]
+[body.oil.shape]
+kind = "box"
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+spacing = 0.1
+"""
+
+
+def test_case_files_take_fluids_and_the_walls_they_stick_to(tmp_path):
+    (tmp_path / "oil.toml").write_text(CASE, encoding="utf-8")
+    simulation = read_case(tmp_path / "oil.toml").build()
+    simulation.run(1e-3)
+    lowest = simulation.X[:100, 1] < 0.1
+    assert (simulation.v[:100][lowest, 0] > 0.0).all() and simulation.history("viscous_work").max() > 0.0
 
 
 # liquids at rest and with a free surface

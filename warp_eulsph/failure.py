@@ -8,7 +8,7 @@ import numpy as np
 from .body import Body
 from .order import Order
 from .scheme.arrangement import Arrangement
-from .scheme.health import UnstableError, last_good
+from .scheme.health import WELL, UnstableError, last_good
 from .scheme.stepper import Stepper
 from .scheme.time_step import DeviceClock
 
@@ -29,6 +29,7 @@ class Failing(Protocol):
     Attributes:
         output: who keeps frames, None where nobody does.
         tear: the first time that a solid came apart.
+        broken: words on the first particle that failed by its law.
     """
 
     stepper: Stepper
@@ -39,6 +40,7 @@ class Failing(Protocol):
     arrangement: Arrangement
     output: Any
     tear: UnstableError | None
+    broken: str | None
 
     @property
     def t(self) -> float:
@@ -85,6 +87,7 @@ def failure(simulation: Failing) -> UnstableError | None:
         what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
         remedy = f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
     else:
+        _look_for_failed(simulation)
         return _look_for_tears(simulation)
     return UnstableError(
         f"unstable at t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
@@ -108,6 +111,21 @@ def _look_for_tears(simulation: Failing) -> UnstableError | None:
             log.warning("%s", simulation.tear)
             break
     return None
+
+
+def _look_for_failed(simulation: Failing) -> None:
+    """Note the first particle that has failed by its law and log it, once."""
+    if simulation.broken is None:
+        media = [(medium.span.start, medium.breaking) for medium in simulation.stepper.media]
+        places = [(start, int(breaking.first.numpy()[0])) for start, breaking in media if breaking is not None]
+        found = [start + place for start, place in places if place != WELL]
+        if found:
+            particle = int(simulation.order.ids.numpy()[found[0]])
+            simulation.broken = (
+                f"matter has failed by t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
+                f"{where(simulation, particle, simulation.x)} is among the first"
+            )
+            log.warning("%s", simulation.broken)
 
 
 def _tear(simulation: Failing, particle: int) -> UnstableError:

@@ -125,6 +125,7 @@ class Simulation(Looks):
         self.diagnostics = Diagnostics(self.space, self.particles, self.device)
         self.whole = Whole()
         self.tear: UnstableError | None = None  # the first time that a solid came apart without a law of failure
+        self.broken: str | None = None  # words on the first particle that failed by its law
         self.watch: Bar | None = None  # shows how far a run is
         self.output: Any = None  # who keeps frames: its ``last`` is named when the run fails
 

@@ -48,7 +48,7 @@ class NoSlip(Image):
         velocity: v_w of the wall within its plane [m/s], (dim,); None is a wall at rest.
     """
 
-    velocity: tuple[float, ...] | None = None
+    velocity: Sequence[float] | None = None
     odd = False
 
 
@@ -210,7 +210,8 @@ class BoundMirrorGhosts(Bound):
         share[self._ghosts.numpy()] = 0.0
         assembly.particles.share.assign(share)
         self._sticks = isinstance(self.image, NoSlip)
-        wall = getattr(self.image, "velocity", None) or (0.0,) * self.space.dim
+        moving = getattr(self.image, "velocity", None)
+        wall = np.zeros(self.space.dim) if moving is None else moving
         self._plane = [self.space.vec(*given) for given in (condition.point, condition.normal, wall)]
 
     def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:

@@ -99,13 +99,21 @@ def least_two(space: Space) -> wp.Function:
 
 @functools.cache
 def make_outward(space: Space) -> wp.Kernel:
-    """Kernel: which way out is, −2 V_a Σ_b w_ab ξ [m^(d−1)], where the arrangement moves."""
+    """Kernel: which way out is, −2 V_a Σ_b w_ab ξ [m^(d−1)], where the arrangement moves; zero where it flows."""
     vec, real, separation = space.vec, space.real, difference(space)
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def find_outward(first: int, reference: Reference, near: Neighbours, outward: wp.array(dtype=vec)):
+    def find_outward(
+        first: int,
+        reference: Reference,
+        near: Neighbours,
+        flowing: wp.array(dtype=wp.int32),
+        outward: wp.array(dtype=vec),
+    ):
         a = first + wp.tid()
+        if flowing[a] == 1:
+            return
         total = vec()
         for k in range(near.start[a], near.start[a + 1]):
             total -= near.w[k] * separation(reference.x[near.index[k]], reference.x[a], near.box)
@@ -118,7 +126,7 @@ def make_outward(space: Space) -> wp.Kernel:
 def make_find(space: Space) -> wp.Kernel:
     """Kernel: whether a particle is outermost: a large area vector, and none above it (``boundaries/outermost.py``).
 
-    Fragments without an area vector, which have hardly any neighbours, are outermost.
+    Fragments without an area vector, which have hardly any neighbours, are outermost, and so are all that flow.
     """
     vec, real, dim, separation = space.vec, space.real, space.dim, difference(space)
     Particles, Reference, Neighbours = (
@@ -134,6 +142,7 @@ def make_find(space: Space) -> wp.Kernel:
         reference: Reference,
         near: Neighbours,
         poor: wp.array(dtype=wp.int32),
+        flowing: wp.array(dtype=wp.int32),
         outward: wp.array(dtype=vec),
         least: real,
         outermost: wp.array(dtype=wp.int32),
@@ -161,7 +170,7 @@ def make_find(space: Space) -> wp.Kernel:
                         lean += beside
             if around > 1 and wp.length(lean) <= real(0.35) * reach:
                 found = 0
-        elif poor[a] != 0:
+        elif poor[a] != 0 or flowing[a] == 1:
             found = 1
         if particles.share[a] == real(0.0):
             found = 0
@@ -231,6 +240,8 @@ def make_area(space: Space) -> wp.Kernel:
             if spread[next] > real(SPREAD):
                 uneven = wp.clamp(spread[least] / spread[next], real(0.0), real(1.0))
         area[k] = real(1.0) / total
+        if wp.length_sq(outward[a]) == real(0.0):  # nobody knows beside whom
+            area[k] = wp.pow(particles.V0[a], real(wp.static(1.0 - 1.0 / dim)))
         bend[k] = uneven
 
     return find_area

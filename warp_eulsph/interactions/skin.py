@@ -20,32 +20,39 @@ if TYPE_CHECKING:
 
 
 class _Layer:
-    """The skin of one medium; its outermost particles are those of the reference."""
+    """The skin of one medium; its outermost particles are those of the reference.
+
+    Attributes:
+        outermost: of all its particles, (n,) int32. outward: which way out is, (n,) of vec; zero in liquids.
+        changes: whether other particles may become outermost.
+    """
 
     def __init__(self, space: Space, medium: "Medium", device: Any):
         self.space, self.medium, self._launch = space, medium, Launcher(device)
         n = medium.n
         self.outermost = wp.zeros(n, dtype=wp.int32, device=device)
         fixed, exact = medium.configuration.fixed, medium.surface_given
+        flowing = np.zeros(n, dtype=np.int32)
+        for part in medium.flux.parts:
+            flows = not fixed and part.law.update is not None and part.law.rebase is None
+            flowing[part.first : part.first + part.size] = flows
+        self._flowing = wp.array(flowing, dtype=wp.int32, device=device)
         self.outward = medium.particles.outward
-        if not fixed and not exact:
+        if not fixed and (flowing.any() or not exact):
             self.outward = wp.zeros(n, dtype=space.vec, device=device)
+        self.changes = self.outward is not medium.particles.outward and not flowing.all()
         self.least = 0.0 if exact else LARGE
         self._normals, self._centres, self._levers = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
         self.wanted = wp.zeros(n, dtype=wp.int32, device=device)
-
-    @property
-    def changes(self) -> bool:
-        """Whether other particles may become outermost."""
-        return self.outward is not self.medium.particles.outward
 
     def find(self) -> None:
         """Which are outermost in the present reference."""
         configuration, n = self.medium.configuration, self.medium.n
         if self.changes:
-            arguments = [configuration.fields, configuration.near, self.outward]
+            arguments = [configuration.fields, configuration.near, self._flowing, self.outward]
             self._launch(make_outward(self.space), n, arguments)
-        arguments = [self.medium.particles, configuration.fields, configuration.near, configuration.poor, self.outward]
+        arguments = [self.medium.particles, configuration.fields, configuration.near, configuration.poor]
+        arguments += [self._flowing, self.outward]
         self._launch(make_find(self.space), n, [*arguments, self.least, self.outermost])
 
     def areas(self, places: wp.array, there: wp.array, area: wp.array, bend: wp.array) -> None:
@@ -87,7 +94,8 @@ class Skin:
     """The outermost particles of bodies, in gathers that are the same on any number of threads.
 
     Where the arrangement stays that of the start, its outermost particles stay outermost, and the skin has them alone;
-    where it is read anew, every particle may be, and ``there`` says which are. An outermost particle lies half a
+    where it is read anew, every particle may be, and ``there`` says which are. Particles of liquids change places all
+    the time: all of them are, and have no normal. An outermost particle lies half a
     spacing beneath the surface; bodies are at least two particles thick.
 
     Args:

@@ -2,6 +2,8 @@
 
 from .bar import Bar
 from .base import Law, Material, Variable
+from .damage import Failure, JohnsonCookFailure, PlasticStrain, PrincipalStrain, PrincipalStress
+from .failing import Failing
 from .fluid import Fluid
 from .hardening import Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
 from .j2 import J2
@@ -19,10 +21,13 @@ from .viscosity import Newtonian, PowerLaw, Viscosity
 __all__ = [
     "J2",
     "Bar",
+    "Failing",
+    "Failure",
     "Fluid",
     "Hardening",
     "IdealGas",
     "JohnsonCook",
+    "JohnsonCookFailure",
     "Law",
     "LinearElastic",
     "LinearHardening",
@@ -33,7 +38,10 @@ __all__ = [
     "NeoHookean",
     "NeoHookeanLog",
     "Newtonian",
+    "PlasticStrain",
     "PowerLaw",
+    "PrincipalStrain",
+    "PrincipalStress",
     "SaintVenantKirchhoff",
     "StiffenedGas",
     "Tabulated",

@@ -25,6 +25,7 @@ class Variable(NamedTuple):
         meaning: in a few words.
         start: its value at the start: a number, or six of a symmetric tensor, xx, yy, zz, xy, xz, yz in any dimension.
         least: bound from below, which a remap (M15) must not pass; None has none.
+        of_spacing: ``start`` is in initial spacings of the particle.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Variable(NamedTuple):
     meaning: str
     start: float | tuple[float, float, float, float, float, float] = 0.0
     least: float | None = None
+    of_spacing: bool = False
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -56,6 +58,8 @@ class Law(NamedTuple):
         heat: see below; None takes none.
         secant: (h, constants) -> share in [0, 1] of the elastic stiffness in shear that stress over total strain still
             is, by which positions are tied to F (M16): all of it where it is None, with h of the start too.
+        failed: (h, constants) -> whether the particle has failed for good. The first of a run is logged; where the
+            arrangement stays, those that open (J > 1) lose their neighbours. None never fails.
         history: the variables that the law remembers, in this order one row of reals per particle; the same in every
             dimension.
 
@@ -88,12 +92,18 @@ class Law(NamedTuple):
     viscosity: Any = None
     heat: Any = None
     secant: Any = None
+    failed: Any = None
     history: tuple[Variable, ...] = ()
 
     @property
     def start(self) -> tuple[float, ...]:
         """The row of the history at the start."""
         return tuple(value for variable in self.history for value in variable.values)
+
+    def start_of(self, spacing: np.ndarray) -> np.ndarray:
+        """The rows at the start of particles with these spacings [m], (n,): (n, k)."""
+        scales = [variable.of_spacing for variable in self.history for _ in variable.values]
+        return np.where(scales, spacing[:, None], 1.0) * np.array(self.start)
 
     def columns(self, name: str) -> slice:
         """Where the variable of this name stands in the row.

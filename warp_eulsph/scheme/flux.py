@@ -315,7 +315,7 @@ class Flux:
     ):
         self.space, self.particles, self.device = space, particles, device
         self._launch = Launcher(device)
-        self.kinds = kinds_of(space, bodies, int(particles.body.numpy()[0]), device)
+        self.kinds = kinds_of(space, bodies, particles, device)
         self.parts = [part for kind in self.kinds for part in kind.parts]
         n = sum(part.size for part in self.parts)
         remembers = any(part.law.history for part in self.parts)

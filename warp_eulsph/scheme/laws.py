@@ -12,6 +12,7 @@ from ..fields import part_of, structure
 from ..materials import Law, Material
 from ..materials.base import history_row
 from ..space import Space
+from ..structs import ParticleArrays
 
 
 class Part(NamedTuple):
@@ -72,24 +73,32 @@ def constants_of_body(space: Space, law: Law, several: bool) -> wp.Function:
     return constants_of
 
 
-def kinds_of(space: Space, bodies: Sequence[tuple[Material, int]], number: int, device: wp.DeviceLike) -> list[Kind]:
-    """The kinds of (material, number of particles) in the order of the particles, the first of body ``number``."""
+def kinds_of(
+    space: Space, bodies: Sequence[tuple[Material, int]], particles: ParticleArrays, device: wp.DeviceLike
+) -> list[Kind]:
+    """The kinds of (material, number of particles) in the order of the ``particles``."""
     kinds: list[Kind] = []
-    first = 0
+    first, number, spacing = 0, int(particles.body.numpy()[0]), particles.spacing.numpy()
     for law, alike in groupby(bodies, lambda body: body[0].law(space)):
-        kinds.append(_kind(space, law, list(alike), number, first, device))
+        kinds.append(_kind(space, law, list(alike), number, first, spacing[first:], device))
         first += kinds[-1].size
         number += len(kinds[-1].parts)
     return kinds
 
 
 def _kind(
-    space: Space, law: Law, bodies: list[tuple[Material, int]], number: int, first: int, device: wp.DeviceLike
+    space: Space,
+    law: Law,
+    bodies: list[tuple[Material, int]],
+    number: int,
+    first: int,
+    spacing: np.ndarray,
+    device: wp.DeviceLike,
 ) -> Kind:
     size = sum(count for _, count in bodies)
     history = wp.zeros(size if law.history else 0, dtype=history_row(space, law), device=device)
     if law.history:
-        history.assign(np.broadcast_to(law.start, (size, len(law.start))))
+        history.assign(law.start_of(spacing[:size]))
     ends = np.cumsum([0, *(count for _, count in bodies)]).tolist()
     constants = [material.filled_constants(law) for material, _ in bodies]
     parts = [

@@ -12,6 +12,7 @@ from ..fields import part, part_of
 from ..space import Space
 from ..structs import ClockArrays, ForceArrays, ParticleArrays, StateArrays
 from .base import Scheme
+from .breaking import Breaking
 from .dissipation import UpwindForces
 from .dual_forces import DualForces
 from .flux import Flux
@@ -77,7 +78,7 @@ class Medium:
     Attributes:
         surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
-        heating: None where no law takes heat. volumes: None where no volume flows between pairs.
+        breaking, heating, volumes: None where no law fails, none takes heat, no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
     """
@@ -115,6 +116,8 @@ class Medium:
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
+        breaks = any(part.law.failed is not None for part in self.flux.parts)
+        self.breaking = Breaking(space, self.flux, self.configuration, device) if breaks else None
         self.limiter: MassDiffusion | None = None
         if options.limiter is not None:
             self.limiter = options.limiter.build(space, self.particles, self.configuration, device)
@@ -216,6 +219,8 @@ class Medium:
         """Derive what the evolving arrays determine, after they were overwritten."""
         self.configuration.rebuild()
         self._derive()
+        if self.breaking is not None:
+            self.breaking.rebuild()
 
     def _derive(self) -> None:
         self.configuration.resolve()
@@ -326,6 +331,8 @@ class Medium:
     def update(self, state: StateArrays) -> None:
         """Histories after a full step, and what materials keep of F: liquids J only."""
         self.flux.update(self.of(state).F, self.grad_v, self.configuration, self.clock)
+        if self.breaking is not None:
+            self.breaking.update(self.of(state).F)
 
     def find_heat(self, state: StateArrays) -> None:
         """What M9 took in the step that ended in ``state``, particle by particle."""
@@ -352,6 +359,8 @@ class Medium:
         parts = [self.configuration.evolving(), self.flux.evolving(), self.stabiliser.evolving()]
         if self.shifter is not None:
             parts.append(self.shifter.evolving())
+        if self.breaking is not None:
+            parts.append(self.breaking.evolving())
         return {name: array for held in parts for name, array in held.items()}
 
     def _smooth_field(self, f: wp.array, gradient: wp.array, out: wp.array) -> None:

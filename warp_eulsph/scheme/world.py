@@ -56,10 +56,12 @@ class _Steady(NamedTuple):
 
 
 def _steady(media: Sequence[Medium], conditions: Sequence[Bound]) -> _Steady:
-    """What is steady: no limiter changes v, and no condition does that is not steady itself and in all of its media."""
+    """What is steady: no limiter changes v, no breaking matter M4, no condition v that is not steady itself and in all
+    of its media.
+    """
     imposing = [condition for condition in conditions if type(condition).impose is not Bound.impose]
     where = {id(c): [m for m in media if _acts_on(c, m.span)] for c in imposing}
-    found = [medium for medium in media if medium.limiter is None]
+    found = [medium for medium in media if medium.limiter is None and medium.breaking is None]
     for _ in media:  # a condition of two media may make both unsteady, which others share
         for c in imposing:
             if not c.steady or any(medium not in found for medium in where[id(c)]):
