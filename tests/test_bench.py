@@ -10,7 +10,7 @@ import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.bench import command, many_runs, mixing, release, snapshot_cost
+from warp_eulsph.bench import command, equal_error, many_runs, mixing, release, snapshot_cost
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
 from warp_eulsph.bench.phases import PHASES
@@ -158,3 +158,16 @@ def test_many_runs_together_are_timed_beside_those_one_by_one(monkeypatch, capsy
     finally:
         execution.set_threads(before)
     assert "3 bars of 40 particles, 30 steps each" in capsys.readouterr().out
+
+
+def test_runs_beside_the_first_release_still_have_their_error(monkeypatch, capsys):
+    """The bar, which is quick: the error that is recorded, within 5 %."""
+    monkeypatch.setattr(equal_error, "FIRST_RELEASE", {"bar": equal_error.FIRST_RELEASE["bar"]})
+    before = execution.threads()
+    try:
+        equal_error.main(["--beside"])
+    finally:
+        execution.set_threads(before)
+    then, recorded, here = (line.split("|") for line in capsys.readouterr().out.splitlines()[2:])
+    assert max(float(row[4]) for row in (then, recorded, here)) < 0.0501
+    assert float(here[4]) == pytest.approx(float(recorded[4]), rel=0.02)

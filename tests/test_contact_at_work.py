@@ -6,6 +6,8 @@ from touching import SOFT, bar, bits, mean_velocity, rectangle, rings
 
 import warp_eulsph as es
 from warp_eulsph import execution
+from warp_eulsph.output import InteractionProbe, Recording, Run, record
+from warp_eulsph.schedule import EverySteps
 
 
 @pytest.mark.parametrize("scheme", [es.Verlet(), es.LaxWendroff()], ids=["Verlet", "LaxWendroff"])
@@ -48,6 +50,41 @@ def test_the_same_bits_on_any_number_of_threads():
         simulation.step(15)
         found.append(bits(simulation))
     assert found[0] == found[1]
+
+
+def test_sorted_in_memory_it_goes_on():
+    """A drop, whose particles are sorted, on a solid beside it: the same but for the order of sums."""
+    found = []
+    for sort in (False, True):
+        h = 0.1
+        block = es.Body(x=rectangle(20, 4, h), volume=h * h, material=SOFT, name="block")
+        water = es.TaitLiquid(density=1000.0, sound_speed=50.0)
+        x = rectangle(8, 6, h, (0.65, 0.4))
+        drop = es.Body(x=x, volume=h * h, material=water, velocity=(0.5, -5.0), name="drop")
+        simulation = es.Simulation([block, drop], interactions=[es.Contact(friction=0.3)])
+        simulation.step(8)
+        assert simulation.energy()["held"] > 0.0
+        if sort:
+            random = np.random.default_rng(1)
+            simulation.sorting.permute(np.concatenate([random.permutation(80), 80 + random.permutation(48)]))
+        simulation.step(30)
+        found.append((simulation.x, simulation.v))
+    np.testing.assert_allclose(found[1][0], found[0][0], atol=1e-9)
+    np.testing.assert_allclose(found[1][1], found[0][1], atol=1e-6)
+
+
+def test_its_force_is_in_probes_and_snapshots(tmp_path):
+    simulation = rings(0.15)
+    probe = InteractionProbe(name="push", body="left", schedule=EverySteps(10))
+    record(simulation, tmp_path, 0.01, Recording(fields=["interaction_force"], dtype=np.float64, probes=[probe]))
+    pushed = simulation.interaction_force
+    assert np.abs(pushed).max() > 0.0
+    np.testing.assert_array_equal(Run(tmp_path)[-1].field("interaction_force"), pushed)
+    measured = probe.bind(simulation)()["force"]
+    np.testing.assert_allclose(measured, pushed[simulation.ranges["left"]].sum(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(pushed.sum(axis=0), 0.0, atol=1e-9 * np.abs(pushed).sum())
+    with pytest.raises(ValueError, match="has no interactions"):
+        probe.bind(es.Simulation(simulation.bodies[0]))
 
 
 def test_it_searches_only_when_something_has_moved():

@@ -12,6 +12,7 @@ from cubin import usage
 
 import warp_eulsph as es
 from warp_eulsph import execution
+from warp_eulsph.interactions import Free, Sphere
 from warp_eulsph.materials import J2, IdealGas, JohnsonCook, MieGruneisen, Newtonian
 
 CASES = [
@@ -37,6 +38,9 @@ def problems(dim, dtype):
     even = {"arrangement": es.Current(), "scheme": es.Verlet(shifting=es.Shifting())}
     for options in ({}, even):
         yield es.Simulation(yielding, boundaries=[fixed], dtype=dtype, **options)
+    place = [0.5] * (dim - 1) + [1.51]
+    ball = es.RigidBody(Sphere(0.5), centre=place, motion=Free(mass=10.0, gravity=9.81), friction=0.3)
+    yield es.Simulation(body, interactions=[ball], dtype=dtype)
     gas = IdealGas(density=1.2, pressure=1e5, viscosity=Newtonian(viscosity=1.0), cavitation=1e3)
     metal = MieGruneisen(density=8930.0, sound_speed=3940.0, slope=1.489, gruneisen=1.99)
     upwind = es.Upwind(sensor=es.DimensionlessSensor(), volume=True)

@@ -183,6 +183,22 @@ def test_neighbours_read_anew_bear_pressure_after_failure():
     assert abs(energy["residual"]) < 1e-11 * energy["total"] + 1e-11
 
 
+def test_bodies_that_break_alike_keep_their_own_matter():
+    """Two with the same criterion and other stiffnesses: each reacts by its own."""
+    x, volume = box((0.0, 0.0), (1.0, 1.0), 0.25)
+    bodies = []
+    for k, young in enumerate((1e6, 1e3)):
+        whole = NeoHookean(density=1000.0, young=young, poisson=0.0)
+        velocity = 0.1 * (x - 0.5) * np.array([1.0, 0.0])
+        material = Failing(material=whole, failure=BRITTLE[1])
+        bodies.append(es.Body(x=x + 5.0 * k, volume=volume, material=material, velocity=velocity, name=str(k)))
+    simulation = es.Simulation(bodies)
+    simulation.step(3)
+    stress, strain = simulation.cauchy_stress[:, 0, 0], simulation.F[:, 0, 0] - 1.0
+    young = np.repeat([1e6, 1e3], 16)
+    np.testing.assert_allclose(stress, young * strain, rtol=0.02)
+
+
 def test_damage_is_in_snapshots_and_case_files(tmp_path):
     from warp_eulsph.output import Recording, Run, record
 

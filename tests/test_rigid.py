@@ -10,7 +10,10 @@ from bodies import RUBBER, bits, block
 import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.geometry import box
-from warp_eulsph.interactions import Box, Cylinder, Driven, Free, Held, Moving, Plane, RigidBody, Sphere, traces
+from warp_eulsph.interactions import Box, Driven, Free, Held, Moving, Plane, RigidBody, Sphere, traces
+from warp_eulsph.output import Recording, record
+from warp_eulsph.output.record import ChangedCaseError
+from warp_eulsph.schedule import AtTimes
 
 ELASTIC = es.LinearElastic(density=1.0, young=1.0, poisson=0.0)  # c = 1
 FLOOR = RigidBody(Plane((0.0, 1.0)), name="floor")
@@ -122,6 +125,25 @@ def test_a_block_rests_under_its_weight():
     assert np.abs(simulation.v).max() < 1e-3
     energy = simulation.energy()
     assert energy["interaction"] < 1e-3 * energy["external"]
+
+
+@pytest.mark.slow
+def test_a_block_rests_for_a_hundred_thousand_steps():
+    """Without damping but the scheme's own: no drift, no gain, and motion dies out."""
+    x, volume = box(lower=(0.0, 0.0), upper=(1.0, 0.5), spacing=0.1)
+    simulation = es.Simulation(
+        es.Body(x=x, volume=volume, material=RUBBER), boundaries=[es.Gravity()], interactions=[FLOOR]
+    )
+    simulation.step(20_000)
+    before = simulation.energy()
+    simulation.step(80_000)
+    after = simulation.energy()
+    centre = simulation.x.mean(axis=0)
+    assert abs(centre[0] - 0.5) < 1e-12
+    assert 0.2499 < centre[1] < 0.25
+    assert after["kinetic"] < before["kinetic"] < 1e-6 * before["external"]
+    assert before["total"] * (1.0 - 1e-3) < after["total"] < before["total"]
+    assert after["interaction"] == pytest.approx(before["interaction"], abs=1e-7 * before["total"])
 
 
 def far_away(dim, **options):
@@ -254,6 +276,22 @@ def test_resumed_runs_go_on_bit_for_bit():
     assert bits(resumed) == bits(whole)
 
 
+def test_recorded_runs_go_on_and_know_their_rigid_bodies(tmp_path):
+    def run(directory, until, radius=0.25):
+        simulation = dropped()
+        ball = dataclasses.replace(simulation.interactions[0], shape=Sphere(radius), friction=0.2)
+        simulation = es.Simulation(simulation.bodies, interactions=[ball])
+        record(simulation, directory, until, Recording(snapshots=AtTimes([0.004, 0.006])), resume=True)
+        return simulation
+
+    whole = run(tmp_path / "whole", 0.006)
+    run(tmp_path / "parts", 0.004)
+    assert bits(run(tmp_path / "parts", 0.006)) == bits(whole)
+    assert rigid(whole).force.any()
+    with pytest.raises(ChangedCaseError, match=r"interactions.0.shape.radius: 0.25, now 0.2"):
+        run(tmp_path / "parts", 0.01, radius=0.2)
+
+
 def test_a_disc_in_a_hollow_box_bounces_about():
     """A body inside a container that has no matter where it is, at an angle."""
     container = RigidBody(Box((2.0, 2.0)), centre=(0.5, 0.5), rotation=(0.3,), hollow=True)
@@ -272,98 +310,6 @@ def test_a_disc_in_a_hollow_box_bounces_about():
 
 def container_axes(angle):
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-@pytest.mark.parametrize(
-    ("shape", "dim", "place", "normal", "distance"),
-    [
-        (Plane((0.0, 2.0)), 2, (3.0, 0.5), (0.0, 1.0), 0.5),
-        (Sphere(1.0), 3, (0.0, 0.0, -1.5), (0.0, 0.0, -1.0), 0.5),
-        (Sphere(1.0), 1, (0.75,), (1.0,), -0.25),
-        (Box((2.0, 4.0)), 2, (1.3, 0.5), (1.0, 0.0), 0.3),
-        (Box((2.0, 4.0)), 2, (1.3, -2.4), (0.6, -0.8), 0.5),
-        (Box((2.0, 4.0)), 2, (0.5, 1.9), (0.0, 1.0), -0.1),
-        (Box((2.0, 2.0, 2.0)), 3, (2.0, 3.0, 3.0), (1 / 3, 2 / 3, 2 / 3), 3.0),
-        (Cylinder(1.0, 2.0), 3, (0.0, 1.3, 0.2), (0.0, 1.0, 0.0), 0.3),
-        (Cylinder(1.0, 2.0), 3, (1.3, 0.0, 1.4), (0.6, 0.0, 0.8), 0.5),
-        (Cylinder(1.0, 2.0), 3, (0.2, 0.0, -0.95), (0.0, 0.0, -1.0), -0.05),
-        (Cylinder(1.0, 4.0, axis=(1.0, 0.0, 0.0)), 3, (1.8, 0.0, 1.25), (0.0, 0.0, 1.0), 0.25),
-    ],
-)
-def test_distances(shape, dim, place, normal, distance):
-    found = distance_of(shape, dim, place)
-    np.testing.assert_allclose(found, [*normal, *[0.0] * (3 - dim), distance], atol=1e-12)
-
-
-def distance_of(shape, dim, place):
-    """Normal and distance [m] at a place in the frame that the user gave, (4,)."""
-    from warp_eulsph.interactions.shapes import Numbers, Triangles
-
-    solid, function = shape.solid(dim, "cpu"), shape.distance
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def ask(p: wp.vec3d, numbers: Numbers, triangles: Triangles, out: wp.array(dtype=wp.vec4d)):
-        out[0] = function(p, numbers, triangles)
-
-    p = np.zeros(3)
-    p[:dim] = place
-    out = wp.zeros(1, dtype=wp.vec4d, device="cpu")
-    local = solid.axes.T @ (p - solid.home)
-    numbers = Numbers(*[*solid.numbers, *[0.0] * 6][:6])
-    wp.launch(ask, 1, [wp.vec3d(*local), numbers, solid.triangles, out], device="cpu")
-    found = out.numpy()[0]
-    return np.concatenate([solid.axes @ found[:3], found[3:]])
-
-
-def test_moments_of_inertia():
-    """Against sums over a fine lattice in each shape."""
-    grid = (np.indices((60, 60, 60)).reshape(3, -1).T + 0.5) / 30.0 - 1.0
-    inside = {
-        Sphere(0.9): np.linalg.norm(grid, axis=1) < 0.9,
-        Box((1.0, 1.6, 0.8)): (np.abs(grid) < [0.5, 0.8, 0.4]).all(axis=1),
-        Cylinder(0.7, 1.2): (np.hypot(grid[:, 0], grid[:, 1]) < 0.7) & (np.abs(grid[:, 2]) < 0.6),
-    }
-    for shape, chosen in inside.items():
-        square = (grid[chosen] ** 2).mean(axis=0)
-        solid = shape.solid(3, "cpu")
-        np.testing.assert_allclose(np.sort(solid.inertia), np.sort(square.sum() - square), rtol=0.01)
-        assert solid.volume == pytest.approx(chosen.sum() / 30.0**3, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Free(), "needs either a mass or a density, got neither"),
-        (lambda: Free(mass=1.0, density=2.0), "got both"),
-        (lambda: Free(mass=-1.0), "mass must be positive and finite, got -1"),
-        (lambda: Sphere(0.0), "Sphere: radius must be positive"),
-        (lambda: Box((1.0, -1.0)), "Box: sides must be positive"),
-        (lambda: built(RigidBody(Plane((0.0, 1.0)), motion=Free(mass=1.0))), "a plane without end cannot move freely"),
-        (lambda: built(RigidBody(Plane((0.0, 0.0)))), "Plane: normal must be"),
-        (
-            lambda: built(RigidBody(Plane((0.0, 1.0)), centre=(0.0, 0.3), name="table")),
-            "rigid body 'table': bodies must",
-        ),
-        (lambda: built(RigidBody(Sphere(0.3), centre=(0.5, 0.5))), "particles of .'body'. inside, the deepest"),
-        (lambda: built(RigidBody(Plane((0.0, 1.0)), bodies=["bodi"])), "body must be one of"),
-        (lambda: built(RigidBody(Box((1.0, 1.0, 1.0)))), "sides must be 2 lengths in 2-D"),
-        (lambda: built(RigidBody(Cylinder(1.0, 1.0))), "is for 3-D"),
-        (lambda: built(RigidBody(Plane((0.0, 1.0)), centre=(0.0,))), "centre must be 2 numbers"),
-        (
-            lambda: built(RigidBody(Sphere(1.0), centre=(9.0, 0.0), rotation=(0.0, 0.0, 1.0))),
-            "rotation must be 1 numbers",
-        ),
-        (lambda: built(RigidBody(Sphere(1.0), hollow=True, motion=Free(mass=1.0))), "a hollow one has no mass"),
-        (lambda: built(RigidBody(Plane((0.0, 1.0)), motion=Driven((1.0, 0.0)))), "must be a function"),
-    ],
-)
-def test_mistakes_are_told(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
-
-
-def built(option):
-    return es.Simulation(block(2, 6), interactions=[option])
 
 
 def test_a_small_overlap_counts_as_touching():

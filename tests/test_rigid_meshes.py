@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import warp as wp
 from bodies import block
-from test_rigid import distance_of, rigid
+from test_rigid import rigid
+from test_rigid_shapes import distance_of
 
 import warp_eulsph as es
 from warp_eulsph.interactions import Box, Free, RigidBody, TriangleMesh

@@ -37,7 +37,7 @@ class BoundLooker(BoundInteraction):
         self.skin.look(world.U)
 
     def rebuild(self, world):
-        self.skin.find()
+        self.skin.rebuild()
 
     def forces(self, world, state, fraction, out):
         pass

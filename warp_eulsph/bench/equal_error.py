@@ -1,15 +1,17 @@
 """Error against processor time: bar, swinging plate and twisting column, per scheme, reference and precision.
 
     python -m warp_eulsph.bench.equal_error            python -m warp_eulsph.bench.equal_error --quick
+    python -m warp_eulsph.bench.equal_error --beside   # an error of 5 % beside what it took in the first release
 
 Each line is one run at the scheme's own Courant number; compare the seconds of lines with like errors. One thread.
 """
 
 import argparse
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
@@ -80,6 +82,22 @@ PROBLEMS = {
     "swinging plate": Problem(_plate, _plate_error, {}, (12,), (12, 20, 28), single=False),
     "twisting column": Problem(lambda n: twisting_column.build(n, Never()), _column_error, {}, (4,), (4, 6, 8)),
 }
+
+
+class Run(NamedTuple):
+    """What a run took: particles across, error, steps, processor seconds."""
+
+    across: int
+    error: float
+    steps: int
+    seconds: float
+
+
+#: Coarsest runs within 5 % that were found, total Lagrangian in float64, of commit 115fbdf (the first release) and of
+#: the commit that recorded them: both checked out on one machine (AMD EPYC, Zen 4, two cores under other load), their
+#: processes run in turns, medians of five; ``measure`` of each.
+FIRST_RELEASE = {"twisting column": Run(12, 0.0449, 622, 4.93), "bar": Run(108, 0.0494, 2550, 0.0501)}
+RECORDED = {"twisting column": Run(3, 0.0334, 220, 0.065), "bar": Run(14, 0.0499, 400, 0.0146)}
 SCHEMES = {"Verlet": Verlet(), "Lax-Wendroff": LaxWendroff()}
 REFERENCES = {"total": Never(), "every 10": Every(10), "Eulerian": Always()}
 
@@ -101,13 +119,30 @@ def measure(problem: Problem, n: int, **options: Any) -> tuple[float | None, int
     return error, run.steps, time.process_time() - start
 
 
+def beside() -> None:
+    """Print what an error of 5 % took in the first release, and takes now: as recorded, and on this machine."""
+    print("| problem | of | across | error | steps | seconds |")
+    print("|---|---|---|---|---|---|")
+    for name, then in FIRST_RELEASE.items():
+        now = RECORDED[name]
+        error, steps, seconds = measure(PROBLEMS[name], now.across, reference=Never(), scheme=Verlet())
+        here = Run(now.across, math.nan if error is None else error, steps, seconds)
+        rows = {"115fbdf": then, "recorded beside it": now, "this machine": here}
+        for of, run in rows.items():
+            print(f"| {name} | {of} | {run.across} | {run.error:.4f} | {run.steps} | {run.seconds:.3f} |", flush=True)
+
+
 def main(argv: list[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="one coarse resolution each: a minute")
+    parser.add_argument("--beside", action="store_true", help="an error of 5 %% now and in the first release: seconds")
     args = parser.parse_args(argv)
     wp.config.log_level = wp.LOG_WARNING
     execution.set_threads(1)
+    if args.beside:
+        beside()
+        return
     print("| problem | across | scheme | reference | precision | error | steps | seconds |")
     print("|---|---|---|---|---|---|---|---|")
     for name, problem in PROBLEMS.items():

@@ -150,8 +150,7 @@ class BoundContact(BoundInteraction):
                 )
 
     def rebuild(self, world: "World") -> None:
-        if self.skin.changes:
-            self.skin.find_layers()
+        self.skin.rebuild()
         self.nearby.forget()
 
     def _find(self, x: wp.array) -> None:

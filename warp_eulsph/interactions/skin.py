@@ -159,7 +159,8 @@ class Skin:
         self._answer = wp.zeros(k, dtype=world.space.mat, device=device)
         self._parts = [[array[own.start : own.stop] for array in self._arrays()] for own in self._spans]
         self.find()
-        self.want(wp.array(np.arange(k + 1), dtype=wp.int32, device=device))  # all of them, until somebody knows better
+        self._all = wp.array(np.arange(k + 1), dtype=wp.int32, device=device)
+        self.want(self._all)  # until somebody knows better
 
     def _arrays(self) -> list[wp.array]:
         return [self.places, self.there, self.area, self.bend, self.normal, self.slope, self._answer, self._beside]
@@ -179,6 +180,13 @@ class Skin:
         self.find_layers()
         for layer, (places, there, area, bend, *_) in zip(self._layers, self._parts, strict=True):
             layer.areas(places, there, area, bend)
+
+    def rebuild(self) -> None:
+        """Derive what goes by place, after particles changed places; all normals are asked for."""
+        self.find_layers()
+        for layer in self._layers:
+            layer.wanted.zero_()
+        self.want(self._all)
 
     def want(self, start: wp.array) -> None:
         """Have ``look`` find the normals of those alone that have something near them; launches only.
