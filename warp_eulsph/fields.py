@@ -90,7 +90,7 @@ def element(space: Space, kind: str) -> type:
 
 
 @functools.cache
-def structure(space: Space, group: str) -> type:
+def structure(space: Space, group: str) -> Any:
     """The ``wp.struct`` of a group of fields."""
     annotations = {name: wp.array(dtype=element(space, field.kind)) for name, field in GROUPS[group].items()}
     return wp.struct(type(group, (), {"__annotations__": annotations, "__module__": __name__}))
@@ -128,7 +128,7 @@ def part_of(array: wp.array, span: range) -> wp.array:
 
 
 @functools.cache
-def neighbour_structure(space: Space) -> type:
+def neighbour_structure(space: Space) -> Any:
     """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.
 
     ``w`` is V_b g_ab [1/m²] with g_ab = −W'(r)/r, so that V_b ∇W_ab = w_ab (x_b − x_a). M3 and M4 take ``own``, M5 the
@@ -148,7 +148,7 @@ def neighbour_structure(space: Space) -> type:
 
 
 @functools.cache
-def clock_structure(space: Space) -> type:
+def clock_structure(space: Space) -> Any:
     """Time on the device, so that a recorded step stays valid: arrays of one element.
 
     ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``longest_dt`` [s] the

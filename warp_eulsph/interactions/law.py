@@ -51,7 +51,7 @@ def rows_structure() -> Any:
 
 
 @functools.cache
-def facing(space: Space) -> Any:
+def facing(space: Space) -> wp.Function:
     """``wp.func`` row: how much two normals face each other, and its slope with n·n'.
 
     1 up to 60° from opposite, 0 from 75.5° on.
@@ -73,7 +73,7 @@ def facing(space: Space) -> Any:
 
 
 @functools.cache
-def pressure(space: Space) -> Any:
+def pressure(space: Space) -> wp.Function:
     """``wp.func`` (r, r0) -> row (p, ∫_r^{r0} p dr) over K: p = ln(r0/r), from r0/4 down along its tangent."""
     real, pair = space.real, space.row(2)
 
@@ -93,7 +93,7 @@ def pressure(space: Space) -> Any:
 
 
 @functools.cache
-def meeting(space: Space) -> Any:
+def meeting(space: Space) -> wp.Function:
     """``wp.func`` (skin, lower, upper, d) -> normal n, row (r, r0, |r_t|, h, share · A_a A_b, q, q', slope).
 
     q and q' are how much n follows the normals of both, ∂n/∂n_a = q (1 − n⊗n) and ∂n/∂n_b = −q' (1 − n⊗n); the slope is
@@ -128,7 +128,7 @@ def meeting(space: Space) -> Any:
 
 
 @functools.cache
-def in_reach(space: Space) -> Any:
+def in_reach(space: Space) -> wp.Function:
     """``wp.func`` whether d is within the range of the weight across and ``along`` sums of half widths along it."""
     real, vec, SkinArrays = space.real, space.vec, skin_structure(space)
 
@@ -144,7 +144,7 @@ def in_reach(space: Space) -> Any:
 
 
 @functools.cache
-def stiffness(space: Space) -> Any:
+def stiffness(space: Space) -> wp.Function:
     """``wp.func`` (skin, lower, upper) -> row 1/(w_a/M_a + w_b/M_b) of pressure and of shear [Pa/m]; 0 for liquids."""
     real, SkinArrays, pair = space.real, skin_structure(space), space.row(2)
 
@@ -161,7 +161,7 @@ def stiffness(space: Space) -> Any:
 
 
 @functools.cache
-def make_push(space: Space, rubs: bool) -> Any:
+def make_push(space: Space, rubs: bool) -> wp.Kernel:
     """Kernel: forces of contact of the rows, and half of the energy of each pair; with friction where it ``rubs``.
 
     A pair is seen from its lower number at both ends, so that both find the same bits. ``slope`` takes what the energy
@@ -239,7 +239,7 @@ def make_push(space: Space, rubs: bool) -> Any:
 
 
 @functools.cache
-def make_rate(space: Space) -> Any:
+def make_rate(space: Space) -> wp.Kernel:
     """Kernel: the largest frequency of contact, of what may touch in the step, or rate at which gaps close [1/s].
 
     The half cells between two particles are a spring of the stiffness A_a A_b φ K/r.
@@ -282,7 +282,7 @@ def make_rate(space: Space) -> Any:
 
 
 @functools.cache
-def make_raise(space: Space) -> Any:
+def make_raise(space: Space) -> wp.Kernel:
     """Kernel of one thread: ask for a step by the frequency that was found."""
     real, Clock = space.real, clock_structure(space)
 

@@ -1,7 +1,6 @@
 """Which outermost particles of other bodies are near each: rows found anew only when something moved far enough."""
 
 import functools
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -21,7 +20,7 @@ RANGE = float(np.hypot(2.0 * REACH, 1.0))
 
 
 @functools.cache
-def _make_moved(space: Space) -> Any:
+def _make_moved(space: Space) -> wp.Kernel:
     """Kernel: the largest distance from where particles were, in their spacings."""
     real, vec = space.real, space.vec
     raise_largest = raise_to(real)
@@ -42,7 +41,7 @@ def _make_moved(space: Space) -> Any:
 
 
 @functools.cache
-def _make_note(space: Space) -> Any:
+def _make_note(space: Space) -> wp.Kernel:
     """Kernel: where particles are, once more as 3-vectors for the grid."""
     real, vec, dim = space.real, space.vec, space.dim
     vec3 = wp.types.vector(length=3, dtype=real)
@@ -67,7 +66,7 @@ def _make_note(space: Space) -> Any:
 
 
 @functools.cache
-def _make_search(space: Space, fill: bool) -> Any:
+def _make_search(space: Space, fill: bool) -> wp.Kernel:
     """Kernel: count a row, or (``fill``) write it sorted by index."""
     real = space.real
     vec3 = wp.types.vector(length=3, dtype=real)

@@ -1,7 +1,6 @@
 """Normals of surfaces, and the forces by which they answer an energy that depends on them."""
 
 import functools
-from typing import Any
 
 import warp as wp
 
@@ -15,7 +14,7 @@ SWEEPS = {1: 0, 2: 1, 3: 4}
 
 
 @functools.cache
-def make_want(space: Space) -> Any:
+def make_want(space: Space) -> wp.Kernel:
     """Kernel: which normals are asked for: those of particles that have others near them, in rows."""
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -33,7 +32,7 @@ def make_want(space: Space) -> Any:
 
 
 @functools.cache
-def make_beside(space: Space) -> Any:
+def make_beside(space: Space) -> wp.Kernel:
     """Kernel: which outermost particles have one beside them whose normal is asked for, or are one."""
     Neighbours = neighbour_structure(space)
 
@@ -58,7 +57,7 @@ def make_beside(space: Space) -> Any:
 
 
 @functools.cache
-def make_normals(space: Space, fixed: bool) -> Any:
+def make_normals(space: Space, fixed: bool) -> wp.Kernel:
     """Kernel: normals of the planes through the outermost particles around.
 
     And how a normal turns with these: ``answer``, Σ_i e_i ⊗ e_i/(λ_i − λ_n) over the other eigenvectors of their second
@@ -143,7 +142,7 @@ def make_normals(space: Space, fixed: bool) -> Any:
 
 
 @functools.cache
-def make_lever(space: Space) -> Any:
+def make_lever(space: Space) -> wp.Kernel:
     """Kernel: what a moment on each normal asks of the particles of its plane."""
     vec, mat = space.vec, space.mat
 
@@ -168,7 +167,7 @@ def make_lever(space: Space) -> Any:
 
 
 @functools.cache
-def make_turn(space: Space) -> Any:
+def make_turn(space: Space) -> wp.Kernel:
     """Kernel: −∂E/∂n · ∂n/∂x: forces on the particles of a plane whose normal an energy depends on.
 
     n is an eigenvector of Σ w ξ' ⊗ ξ', ξ' from their mean, so δn = Σ_i e_i (e_i·δ(Σ w ξ' ⊗ ξ') n)/(λ_n − λ_i).

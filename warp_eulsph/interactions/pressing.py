@@ -99,7 +99,7 @@ def rubbed(y: wp.vec3d, anchor: wp.vec3d, n: wp.vec3d, stiffness: wp.float64, mo
 
 
 @functools.cache
-def make_press(space: Space, distance: Any, rubs: bool) -> Any:
+def make_press(space: Space, distance: Any, rubs: bool) -> wp.Kernel:
     """Kernel: the force of the rigid body on each point, what it does to the rigid body, and the energy it holds."""
     vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
 
@@ -141,7 +141,7 @@ def make_press(space: Space, distance: Any, rubs: bool) -> Any:
 
 
 @functools.cache
-def make_tie(space: Space, distance: Any) -> Any:
+def make_tie(space: Space, distance: Any) -> wp.Kernel:
     """Kernel: where each point is tied to the rigid body, in its frame: after a step where it is, less elastic slip."""
     vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
 

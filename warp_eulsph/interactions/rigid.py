@@ -179,7 +179,7 @@ class BoundRigidBody(BoundInteraction):
                 "touches by bodies=[...]"
             )
 
-    def _press(self, state: Any) -> None:
+    def _press(self, state: StateArrays) -> None:
         arguments = [self._points, state.x, self.motion.at, *self._shape, float(self.option.friction), self._anchors]
         kernel = make_press(self.space, self.option.shape.distance, self._rubs)
         self._launch(kernel, len(self._push), [*arguments, self._push, self._wrenches, self._energies])

@@ -84,15 +84,15 @@ class Law(NamedTuple):
     """
 
     Constants: Any
-    stress: Any
-    energy: Any
-    wave_moduli: Any
-    update: Any = None
-    rebase: Any = None
-    viscosity: Any = None
-    heat: Any = None
-    secant: Any = None
-    failed: Any = None
+    stress: wp.Function
+    energy: wp.Function
+    wave_moduli: wp.Function
+    update: wp.Function | None = None
+    rebase: wp.Function | None = None
+    viscosity: wp.Function | None = None
+    heat: wp.Function | None = None
+    secant: wp.Function | None = None
+    failed: wp.Function | None = None
     history: tuple[Variable, ...] = ()
 
     @property
@@ -151,13 +151,13 @@ def long_form(space: Space, law: Law) -> Law:
     return law._replace(stress=stress, energy=energy, wave_moduli=wave_moduli)
 
 
-def history_row(space: Space, law: Law) -> Any:
+def history_row(space: Space, law: Law) -> type:
     """Warp type of a row of the law's history; of one real that nobody reads where there is none."""
     return space.row(max(len(law.start), 1))
 
 
 @functools.cache
-def largest_eigenvalue(real: type) -> Any:
+def largest_eigenvalue(real: type) -> wp.Function:
     """``wp.func`` largest eigenvalue of [[A, B], [B, C]]; it grows with A, C and |B|, so bounds of them bound it."""
 
     @wp.func
@@ -169,7 +169,7 @@ def largest_eigenvalue(real: type) -> Any:
 
 
 @functools.cache
-def isochoric(real: type) -> Any:
+def isochoric(real: type) -> wp.Function:
     """``wp.func`` J^(−2/3), NaN unless J > 0."""
     root = reciprocal_cube_root(real)
 

@@ -71,7 +71,7 @@ def softening(space: Space) -> wp.Function:
 class PrincipalStress(Failure):
     """Brittle: breaks where the largest principal Cauchy stress of the whole matter passes ``strength``.
 
-    In 2-D the largest in the plane. A crack's width should be less than 2 E G/``strength``²: beyond that it holds more
+    In 2-D the largest in the plane. A crack's width should be less than 2 E G/σ_f²: beyond that it holds more
     energy at the onset than the crack takes, and breaks at once.
 
     Args:

@@ -74,7 +74,7 @@ def in_three_dimensions(space: Space) -> wp.Function:
 
 
 @functools.cache
-def _return_mapping(real: type, Constants: Any, yield_stress: Any) -> wp.Function:
+def _return_mapping(real: type, Constants: Any, yield_stress: wp.Function) -> wp.Function:
     """``wp.func`` (q, α, T, Δt, c) -> Δ with q − 3μ Δ = y(α + Δ, Δ/Δt, T), 0 within the yield surface; NaN: not found.
 
     By regula falsi with the Illinois rule (Dowell & Jarratt 1971), which needs no slope and keeps its bracket: y may
