@@ -100,7 +100,7 @@ def test_description_holds_the_defaults():
     case = parse_case(small())
     described = case.describe()
     assert case.scheme.make() == es.Verlet() and set(described["scheme"]) == {"kind", *vars(es.Verlet())}
-    upwind = {"kind": "Upwind", "epsilon": 1.0, "sensor": {"kind": "None"}, "stress": False}
+    upwind = {"kind": "Upwind", "epsilon": 1.0, "sensor": {"kind": "None"}, "stress": False, "volume": False}
     assert described["scheme"]["dissipation"] == upwind
     assert described["scheme"]["correction"] == {"kind": "Balance", **vars(es.Balance())}
     assert described["time_step"]["growth"] == 1.1 and described["dilation"] == 1.3
