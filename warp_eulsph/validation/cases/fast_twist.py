@@ -21,8 +21,8 @@ from ..solids import RUBBER
 
 HEIGHT, FRAME = 6.0, 0.0025
 #: End [s] by spin. At 400 rad/s the column kinks above its base at 0.05 s, when the wave comes back, and crushes cells
-#: there: at 10 across sharpened (M23), at 16 without (``build(16, 400.0, …)``: J 0.4 at 0.05 s, 0.1 at 0.055 s). Coarser
-#: ones are too stiff to kink.
+#: there: at 10 across sharpened (M23), at 16 without (``build(16, 400.0, …)``: J 0.4 at 0.05 s, 0.1 at 0.055 s).
+#: Coarser ones are too stiff to kink.
 END_TIMES = {300.0: 0.1, 400.0: 0.045}
 
 
