@@ -5,8 +5,7 @@
 A 1 m wide, 6 m high column on a clamped base starts with the sideways velocity 10 y/6 m/s. Prints the largest sideways
 displacement of the tip and its time, the energy kept, and in 3-D the reference (bendY_2.csv); there is none in 2-D
 (Poisson's ratio 0.3), where the printed one is this example's own total Lagrangian run with ``-n 32``. Draws the tip's
-path over time and the bent column (``bending_column.png``). ``--until 2.6`` goes on for three swings. Expect a column
-that is too soft when coarse.
+path over time and the bent column (``bending_column.png``). ``--until 2.6`` goes on for three swings.
 """
 
 import argparse

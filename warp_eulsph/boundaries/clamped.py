@@ -27,7 +27,7 @@ class Clamped(Boundary):
     The weights c_a of a column are those with which a traction would act on it, Σ c_a = 1, Σ c_a d_a = 0 with the
     distances d_a from the plane: the sum is the velocity of the column at the plane, exact where it is linear, and what
     holds it there is a traction, in equilibrium with a uniform stress particle by particle. It exerts forces on
-    particles of up to two support radii beneath the plane, does no work, and leaves the layers free to strain.
+    particles of up to three support radii beneath the plane, does no work, and leaves the layers free to strain.
 
     Args:
         point: a point of the plane [m], (dim,); for bodies of cells the plane lies half a spacing outside of the

@@ -24,7 +24,7 @@ class Pressure(Boundary):
     """−p s_a on a surface, s_a the present area vectors (M10): a follower load.
 
     The region names the surface by its outermost particles; how deep it reaches beneath them does not matter. The force
-    goes to all particles whose area vectors make up that surface, down two support radii, in the proportion in which
+    goes to all particles whose area vectors make up that surface, down three support radii, in the proportion in which
     they answer a uniform stress; its sum is p times the vector area of the surface. Without a normal all of the surface
     that the region holds is loaded, whichever way it faces; with one only what faces it.
 
