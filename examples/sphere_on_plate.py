@@ -33,7 +33,7 @@ def build(n: int) -> es.Simulation:
     plate = es.Body(x=x, volume=volume, material=RUBBER, name="plate")
     sphere = RigidBody(
         Sphere(RADIUS),
-        centre=(0.0, 0.0, HEIGHT + RADIUS + 1e-3),
+        centre=(0.0, 0.0, HEIGHT + RADIUS + 2e-4),
         motion=Free(mass=MASS, velocity=(0.0, 0.0, -SPEED)),
         name="sphere",
     )
