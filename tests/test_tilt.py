@@ -149,15 +149,18 @@ def test_dissipation_with_its_stress_takes_no_angular_momentum(dim):
     assert drift < 1e-13
 
 
-def test_a_thin_beam_five_across_sags_as_it_should():
-    """0.35 m × 0.02 m of Saint Venant–Kirchhoff under g = 2 m/s²: 0.129 m at most.
+@pytest.mark.parametrize(("n", "band"), [(5, 0.03), pytest.param(10, 0.01, marks=pytest.mark.slow)])
+def test_a_thin_beam_sags_as_it_should(n, band):
+    """0.35 m × 0.02 m of Saint Venant–Kirchhoff under g = 2 m/s²: 0.129 m at most, +2.4 and +0.2 % at 5 and 10 across.
 
-    Without tilt it sags 26 % too far.
+    Without tilt and sharpening it sags 26 % too far at 5.
     """
-    along, across = (np.arange(88) + 0.5) * (0.35 / 88), (np.arange(5) + 0.5) * 0.004
-    x, volume = np.stack(np.meshgrid(along, across, indexing="ij"), axis=-1).reshape(-1, 2), 0.35 / 88 * 0.004
+    spacing = 0.02 / n
+    cells = round(0.35 / spacing)
+    along, across = (np.arange(cells) + 0.5) * (0.35 / cells), (np.arange(n) + 0.5) * spacing
+    x, volume = np.stack(np.meshgrid(along, across, indexing="ij"), axis=-1).reshape(-1, 2), 0.35 / cells * spacing
     material = es.SaintVenantKirchhoff(density=1000.0, young=1.4e6, poisson=0.4)
-    body = es.Body(x=x, volume=volume, spacing=0.004, material=material)
+    body = es.Body(x=x, volume=volume, spacing=spacing, material=material)
     clamp = es.Clamped(point=(0.0, 0.0), normal=(-1.0, 0.0))
     made = es.Simulation(body, boundaries=[clamp, es.Gravity(2.0)])
     tip = np.argsort(np.linalg.norm(x - [0.35, 0.01], axis=1))[:2]
@@ -165,7 +168,7 @@ def test_a_thin_beam_five_across_sags_as_it_should():
     for t in np.arange(0.4, 0.53, 0.01):
         made.run(t)
         sag = max(sag, (x[tip, 1] - made.x[tip, 1]).mean())
-    assert sag == pytest.approx(0.129, rel=0.08)
+    assert sag == pytest.approx(0.129, rel=band)
 
 
 @pytest.mark.parametrize("most", [0.0, -1.0, 3.5, np.nan])

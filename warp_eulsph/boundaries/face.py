@@ -51,9 +51,9 @@ class Face:
 def find_face(body: Surface, chosen: np.ndarray, n: np.ndarray, who: str) -> Face:
     """The face along ``n`` whose outermost particles are among ``chosen``.
 
-    The area vectors of a face spread over the layers within three support radii; the face of an outermost particle is the
-    sum of them down the column beneath it. Where the face is flat and particles lie in layers the sum is scaled to the
-    area of the cells of the outermost layer, which it is off where bodies are thin or particles disordered.
+    The area vectors of a face spread over the layers within three support radii; the face of an outermost particle is
+    the sum of them down the column beneath it. Where the face is flat and particles lie in layers the sum is scaled to
+    the area of the cells of the outermost layer, which it is off where bodies are thin or particles disordered.
 
     Args:
         body: the body.

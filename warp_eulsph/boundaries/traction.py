@@ -20,7 +20,7 @@ class Traction(Boundary):
     """Nominal traction t on a face: force t (s_0·n) with the initial area vectors s_0, fixed in direction.
 
     The region names the face by its outermost particles; how deep it reaches beneath them does not matter. The force
-    goes to all particles whose area vectors make up the face, down three support radii, so that a uniform stress P = t⊗n
+    goes to all particles whose area vectors make up the face, down three support radii, so that a uniform stress t⊗n
     is in equilibrium particle by particle; its sum is t times the area of the face, projected along n where it is
     curved.
 
