@@ -80,7 +80,7 @@ class DualForces(Stabiliser):
 
     def __init__(self, space: Space, n: int, sharpener: Sharpener | None, device: wp.DeviceLike):
         self.space, self._sharpener, self._launch = space, sharpener, Launcher(device)
-        self._rows = packed_rows(space, n, space.dim, device)
+        self._rows = packed_rows(space, n if sharpener is None else 0, space.dim, device)
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare."""
@@ -92,11 +92,11 @@ class DualForces(Stabiliser):
     def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
         """Internal force (M5)."""
         configuration, flux, internal, rows = sums.configuration, sums.flux, sums.forces.internal, self._rows
-        if configuration.simd or self._sharpener is not None:
-            self._launch(make_pack(self.space), len(internal), [configuration.fields, flux.Q, rows])
         if self._sharpener is not None:
-            self._sharpener.stress(flux.Q, rows, flux.Pi)
+            self._sharpener.stress(flux.Q, flux.Pi)
             rows = self._sharpener.stress_rows
+        elif configuration.simd:
+            self._launch(make_pack(self.space), len(internal), [configuration.fields, flux.Q, rows])
         if not configuration.simd:
             configuration.divergence(flux.Pi, internal)
             return

@@ -242,16 +242,19 @@ class Sharpener:
         self._launch(_make_gradient(self.space, simd), len(f), [reference, near, f, self._rows])
         self._launch(_make_sharpen(self.space, simd), len(f), [reference, near, self._rows, out])
 
-    def stress(self, Q: wp.array, rows: wp.array, Pi: wp.array) -> None:
-        """Π̃ from Q, and Π = Q Lᵀ in packed ``rows``: into ``stress_rows``, or into ``Pi`` without SIMD kernels."""
-        arguments = [self.configuration.fields, self.configuration.near, Q, rows, self.stress_rows, Pi]
-        self._launch(_make_stress(self.space, self.configuration.simd), len(rows), arguments)
+    def stress(self, Q: wp.array, Pi: wp.array) -> None:
+        """Π̃ from Q, (n,) of mat: into ``stress_rows``, or into ``Pi`` without SIMD kernels."""
+        self._sharpen(Q, Pi, self.configuration.simd)
 
     def unit(self) -> wp.array:
         """Π̃ of a unit stress, (n,) of mat, whose dual divergence is −e_a."""
-        reference, near, n = self.configuration.fields, self.configuration.near, len(self._rows)
+        n = len(self._rows)
         Q = wp.full(n, np.eye(self.space.dim), dtype=self.space.mat, device=self._rows.device)
         Pi = wp.zeros_like(Q)
-        self._launch(make_pack(self.space), n, [reference, Q, self._rows])
-        self._launch(_make_stress(self.space, False), n, [reference, near, Q, self._rows, self.stress_rows, Pi])
+        self._sharpen(Q, Pi, simd=False)
         return Pi
+
+    def _sharpen(self, Q: wp.array, Pi: wp.array, simd: bool) -> None:
+        reference, near, n = self.configuration.fields, self.configuration.near, len(Q)
+        self._launch(make_pack(self.space), n, [reference, Q, self._rows])
+        self._launch(_make_stress(self.space, simd), n, [reference, near, Q, self._rows, self.stress_rows, Pi])
