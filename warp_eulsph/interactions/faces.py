@@ -180,18 +180,56 @@ def make_find(space: Space) -> wp.Kernel:
 
 
 @functools.cache
+def plane_moments(space: Space) -> wp.Function:
+    """``wp.func`` (a, particles, reference, near, x, outward, outermost) -> Σ w, mean of ξ, second moment about it.
+
+    Of the outermost particles that may be of one face with a, itself included, at ``x``: ξ in spacings from a, w by the
+    distance in the reference.
+    """
+    vec, mat, real, separation = space.vec, space.mat, space.real, difference(space)
+    weight_of, alike = surface_weight(space)[0], alike_vectors(space)
+    Particles, Reference, Neighbours = (
+        structure(space, "Particles"),
+        structure(space, "Reference"),
+        neighbour_structure(space),
+    )
+
+    @wp.func
+    def plane_moments(
+        a: int,
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        x: wp.array(dtype=vec),
+        outward: wp.array(dtype=vec),
+        outermost: wp.array(dtype=wp.int32),
+    ):
+        h = real(REACH) * particles.spacing[a]
+        total = weight_of(real(0.0), h)
+        mean = vec()
+        square = mat()
+        for i in range(near.start[a], near.start[a + 1]):
+            b = near.index[i]
+            if outermost[b] == 1 and alike(outward[a], outward[b]):
+                w = weight_of(wp.length(separation(reference.x[b], reference.x[a], near.box)), h)
+                xi = separation(x[b], x[a], near.box) / particles.spacing[a]
+                total += w
+                mean += w * xi
+                square += w * wp.outer(xi, xi)
+        mean = mean / total
+        return total, mean, square / total - wp.outer(mean, mean)
+
+    return plane_moments
+
+
+@functools.cache
 def make_area(space: Space) -> wp.Kernel:
     """Kernel: the face of each outermost particle, 1/Σ_b φ_ab over those of its face, and how far these are from flat.
 
     What was outermost before keeps both: energies that depend on them must not jump.
     """
-    vec, mat, real, dim, separation = space.vec, space.mat, space.real, space.dim, difference(space)
-    weight_of, alike, eigen, order_of = (
-        surface_weight(space)[0],
-        alike_vectors(space),
-        symmetric_eigen(space),
-        least_two(space),
-    )
+    vec, real, dim, weight_of = space.vec, space.real, space.dim, surface_weight(space)[0]
+    moments_of, eigen, order_of = plane_moments(space), symmetric_eigen(space), least_two(space)
     Particles, Reference, Neighbours = (
         structure(space, "Particles"),
         structure(space, "Reference"),
@@ -218,23 +256,11 @@ def make_area(space: Space) -> wp.Kernel:
         there[k] = outermost[a]
         if known:
             return
-        h = real(REACH) * particles.spacing[a]
-        total = weight_of(real(0.0), h)
+        total = weight_of(real(0.0), real(REACH) * particles.spacing[a])
         uneven = real(0.0)
         if wp.static(dim > 1):
-            mean = vec()
-            square = mat()
-            for i in range(near.start[a], near.start[a + 1]):
-                b = near.index[i]
-                if outermost[b] == 1 and alike(outward[a], outward[b]):
-                    xi = separation(reference.x[b], reference.x[a], near.box)
-                    w = weight_of(wp.length(xi), h)
-                    xi = xi / particles.spacing[a]
-                    total += w
-                    mean += w * xi
-                    square += w * wp.outer(xi, xi)
-            mean = mean / total
-            _, spread = eigen(square / total - wp.outer(mean, mean))
+            total, _mean, square = moments_of(a, particles, reference, near, reference.x, outward, outermost)
+            _, spread = eigen(square)
             least, next = order_of(spread)
             uneven = real(1.0)
             if spread[next] > real(SPREAD):

@@ -7,7 +7,7 @@ import warp as wp
 from ..fields import neighbour_structure, structure
 from ..linalg import cofactor, inverse, symmetric_eigen
 from ..space import Space, difference
-from .faces import REACH, SPREAD, alike_vectors, least_two, surface_weight
+from .faces import REACH, SPREAD, alike_vectors, least_two, plane_moments, surface_weight
 
 # Jacobi's sweeps: one rotation is exact in 2-D; in 3-D planes, one eigenvalue far from the others, take four.
 SWEEPS = {1: 0, 2: 1, 3: 4}
@@ -63,14 +63,8 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
     And how a normal turns with these: ``answer``, Σ_i e_i ⊗ e_i/(λ_i − λ_n) over the other eigenvectors of their second
     moment, over their weight and spacing.
     """
-    vec, mat, real, dim, separation = space.vec, space.mat, space.real, space.dim, difference(space)
-    weight_of, eigen, cof, invert = (
-        surface_weight(space)[0],
-        symmetric_eigen(space, SWEEPS[space.dim]),
-        cofactor(space),
-        inverse(space),
-    )
-    alike, order_of = alike_vectors(space), least_two(space)
+    vec, mat, real, dim, cof, invert = space.vec, space.mat, space.real, space.dim, cofactor(space), inverse(space)
+    moments_of, eigen, order_of = plane_moments(space), symmetric_eigen(space, SWEEPS[dim]), least_two(space)
     Particles, Reference, State, Neighbours = (
         structure(space, "Particles"),
         structure(space, "Reference"),
@@ -107,20 +101,8 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
             out = cof(state.F[a] @ invert(reference.F[a])) @ out
         n = wp.normalize(out)
         if wp.static(dim > 1):
-            h = real(REACH) * particles.spacing[a]
-            mass = weight_of(real(0.0), h)
-            mean = vec()
-            square = mat()
-            for i in range(near.start[a], near.start[a + 1]):
-                b = near.index[i]
-                if outermost[b] == 1 and alike(outward[a], outward[b]):
-                    w = weight_of(wp.length(separation(reference.x[b], reference.x[a], near.box)), h)
-                    xi = separation(state.x[b], state.x[a], near.box) / particles.spacing[a]
-                    mass += w
-                    mean += w * xi
-                    square += w * wp.outer(xi, xi)
-            mean = mean / mass
-            axes, spread = eigen(square / mass - wp.outer(mean, mean))
+            mass, mean, square = moments_of(a, particles, reference, near, state.x, outward, outermost)
+            axes, spread = eigen(square)
             least, next = order_of(spread)
             if spread[next] > real(SPREAD) and wp.length(out) > real(0.0):
                 for i in range(wp.static(dim)):
