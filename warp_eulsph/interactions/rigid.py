@@ -238,6 +238,7 @@ class BoundRigidBody(BoundInteraction):
 
     def evolving(self) -> dict[str, wp.array]:
         own = {"wrench": self._wrench, "passed": self._passed} | ({"anchors": self._anchors} if self._rubs else {})
+        own |= {f"met.{k}": wetting.met for k, wetting in enumerate(self._wetted)}
         return {**self.motion.evolving(), **own}
 
     def _row(self, array: wp.array, components: slice) -> np.ndarray:

@@ -239,6 +239,9 @@ class Wetting:
         body: it, with its points.
         wet: numbers of the points that are particles of the liquid, (k,) int32.
         medium: of the liquid, with ``Uncorrected`` sums.
+
+    Attributes:
+        met: G of each point in the present reference (M28), (k,) of vec.
     """
 
     def __init__(self, body: "BoundRigidBody", wet: np.ndarray, medium: "Medium", world: "World"):
@@ -252,19 +255,19 @@ class Wetting:
         table = behind_planes(configuration.weight, self.space.dim, round(ratio, 6))
         self._table = wp.array(table, dtype=wp.float64, device=device)
         self._kappa = medium.stabiliser.kappa
-        self._met = wp.zeros(k, dtype=self.space.vec, device=device)
+        self.met = wp.zeros(k, dtype=self.space.vec, device=device)
         self._powers, self._add = wp.zeros(k, dtype=wp.float64, device=device), Sum(wp.float64, k, device)
         self._step = wp.zeros(1, dtype=wp.float64, device=device)
 
     def _of(self) -> list[Any]:
-        return [self.body.points, self._wet, self._met, self.world.U.x]
+        return [self.body.points, self._wet, self.met, self.world.U.x]
 
     def renew(self) -> None:
         """What of the wall is near each particle of the present reference, and what it does to L; launches only."""
         configuration, body, offset = self.medium.configuration, self.body, self.medium.span.start
         arguments = [body.points, self._wet, self.world.U.x, offset, configuration.fields]
         arguments += [body.motion.pose, *body.shape, self._table, float(configuration.weight.support)]
-        arguments += [self._kappa, self._met]
+        arguments += [self._kappa, self.met]
         self._launch(_make_meet(self.space, body.option.shape.distance), len(self._wet), arguments)
 
     def add_gradient(self, v: wp.array, share: float, out: wp.array) -> None:

@@ -223,7 +223,6 @@ class Medium:
         """Derive what the evolving arrays determine, after they were overwritten."""
         self.configuration.rebuild()
         self._derive()
-        self.walls.renew()
         if self.breaking is not None:
             self.breaking.rebuild()
 
