@@ -151,7 +151,7 @@ def test_solids_that_are_read_anew_cannot_be_uncorrected():
 
 
 def test_liquid_rests_on_an_elastic_solid():
-    """The same on rubber between two walls that touch the water alone: half the sound's way of the tank, half as wide."""
+    """The same on rubber between two walls that touch the water alone; half as wide."""
     n, density = 16, 1e3
     x, volume = box((0.0, 0.0), (0.5, 1.0), 1.0 / n)
     water = es.Body(x=x, volume=volume, material=WATER, spacing=1.0 / n, name="water")
@@ -165,9 +165,7 @@ def test_liquid_rests_on_an_elastic_solid():
     ]
     held = es.Fixed(lambda X: X[:, 1] < -0.25 + 1.0 / n)
     conditions = [es.BodyForce(filling_up, body="water"), es.Damping(30.0), held]
-    simulation = es.Simulation(
-        [water, bed], boundaries=conditions, interactions=[es.Contact(), *sides], scheme=SCHEME
-    )
+    simulation = es.Simulation([water, bed], boundaries=conditions, interactions=[es.Contact(), *sides], scheme=SCHEME)
     found, own = [], slice(0, len(water.x))
     for t in (RAMP + 25.0 / SOUND, RAMP + 50.0 / SOUND):
         simulation.run(t)
@@ -194,7 +192,7 @@ def test_liquid_hits_a_free_solid(dim, real):
     blob = es.Body(x=x, volume=volume, material=water, spacing=1.0 / n, velocity=velocity, name="blob")
     shift = np.full(dim, 0.2 / n)
     shift[0] = -3.0 / n
-    x, volume = box(tuple(shift), tuple(shift + [3.0 / n, *[1.0] * (dim - 1)]), 1.0 / n)
+    x, volume = box(tuple(shift), tuple(shift + np.array([3.0 / n, *[1.0] * (dim - 1)])), 1.0 / n)
     rubber = es.NeoHookean(density=700.0, young=2e6, poisson=0.3)
     block = es.Body(x=x, volume=volume, material=rubber, spacing=1.0 / n, name="block")
     simulation = es.Simulation([blob, block], interactions=[es.Contact()], scheme=SCHEME, dtype=real)

@@ -81,7 +81,6 @@ def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
         a = members[k] - offset
         total = vec()
         scatter = real(0.0)
-        along = vec()
         for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
             total += pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
         wet[k] = int(wp.length_sq(total) > real(0.0))
@@ -140,7 +139,7 @@ def _make_gradient(weight: Weight, space: Space) -> wp.Kernel:
 
 @functools.cache
 def _make_force(weight: Weight, space: Space) -> wp.Kernel:
-    """Kernel: on the liquid, V_a Q_a Σ_b G_ab; and what its velocity gradient does to its store, f_ab·(v̄_b − v̄_a) Δt."""
+    """Kernel: on the liquid, V_a Q_a Σ_b G_ab; and what that gradient does to its store, f_ab·(v̄_b − v̄_a) Δt."""
     vec, real, vec3, pair = space.vec, space.real, _grid_vector(space), _pair(weight, space)
     Reference, Flux, reach = structure(space, "Reference"), structure(space, "Flux"), weight.support * QUERY_MARGIN
 
@@ -278,7 +277,13 @@ class WettingOfSolids:
         self._press_liquid(out)
         medium = self.medium
         arguments = [self._liquid.id, LARGEST_GROWTH * self._reach, self._at, self._V, self._places]
-        arguments += [*self._liquid_members(), medium.configuration.fields, medium.flux.fields, medium.stabiliser.kappa, out]
+        arguments += [
+            *self._liquid_members(),
+            medium.configuration.fields,
+            medium.flux.fields,
+            medium.stabiliser.kappa,
+            out,
+        ]
         self._launch(_make_reaction(self._weight, self.space), len(self._places), arguments)
 
     def _press_liquid(self, out: wp.array) -> None:
