@@ -16,6 +16,7 @@ from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .friction import make_slip
 from .law import make_push, make_raise, make_rate, skin_structure
+from .moved import Moved
 from .nearby import Nearby
 from .skin import Skin
 from .wetting_solids import find_wettings
@@ -78,7 +79,7 @@ class BoundContact(BoundInteraction):
         skin, nearby: from ``start`` on; and slip: elastic slip of the skin's particles [m], (k,) of vec.
     """
 
-    sortable = True
+    sortable = recordable = True
 
     def __init__(self, option: Contact, assembly: Assembly):
         names, self.rubs = list(assembly.bodies), option.friction > 0.0
@@ -118,9 +119,9 @@ class BoundContact(BoundInteraction):
         self._frequency = wp.zeros(1, dtype=self.space.real, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
         self.slip = wp.zeros(k if self.rubs else 0, dtype=self.space.vec, device=device)
-        self._found_at = wp.zeros(k if self.skin.changes else 0, dtype=self.space.vec, device=device)
-        if self.skin.changes:
-            wp.copy(self._found_at, world.U.x[self.skin.places].contiguous())
+        self._found = Moved(self.space, self.skin.places, self.nearby.moved.allowed)
+        self._found.note(world.U.x)
+        self.nearby.look(world.U, world.clock.fields)
         if self._push(world, world.U, 0.0, self._nothing):
             self._measure(world, world.U)
 
@@ -158,16 +159,29 @@ class BoundContact(BoundInteraction):
         self.skin.rebuild()
         self.nearby.forget()
 
-    def _find(self, x: wp.array) -> None:
-        """What is outermost now, where the arrangement is read anew and particles have moved."""
-        if self.skin.changes and self.nearby.moved(x, self._found_at):
+    def prepare(self, world: "World") -> None:
+        """What is outermost now, where the arrangement is read anew and particles have moved, and what is near it."""
+        U, clock = world.U, world.clock
+        if self.skin.changes and self._found(U, clock.fields):
             self.skin.find()
-            wp.copy(self._found_at, x[self.skin.places].contiguous())
+            self._found.note(U.x)
             self.nearby.forget()
+        self.nearby.look(U, clock.fields, clock.option.growth)
+
+    def check(self, world: "World", running: wp.array) -> None:
+        if self.skin.changes:
+            self._found.check(world.U, world.clock.fields, 0.0, running)
+        self.nearby.moved.check(world.U, world.clock.fields, world.clock.option.growth, running)
+
+    @property
+    def waiting(self) -> bool:
+        return self._found.far or self.nearby.moved.far
+
+    def recorded_for(self) -> list[object]:
+        return [self.nearby.rows.index] if self.nearby.pairs else []
 
     def _push(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> bool:
         """Forces at ``state``, and the energy; whether there can be any."""
-        self.nearby.look(state.x)
         if self.nearby.pairs:
             self.skin.look(state)
             arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.clock.fields, fraction]
@@ -189,7 +203,6 @@ class BoundContact(BoundInteraction):
         self._launch(make_rate(self.space), len(self.skin.indices), arguments)
 
     def rate(self, world: "World") -> None:
-        self._find(world.U.x)
         self._launch.once(make_raise(self.space), 1, [self._frequency, world.clock.fields])
 
     def advance(self, world: "World") -> None:
@@ -201,6 +214,7 @@ class BoundContact(BoundInteraction):
             self._launch(make_slip(self.space), len(self.skin.indices), arguments)
 
     def energy(self, world: "World") -> float:
+        self.nearby.look(world.U, world.clock.fields)
         return float(self._energy.numpy().sum()) if self._push(world, world.U, 0.0, self._nothing) else 0.0
 
     def passed(self) -> float:
@@ -210,7 +224,7 @@ class BoundContact(BoundInteraction):
         held = {"frequency": self._frequency} | ({"slip": self.slip} if self.rubs else {})
         if self.skin.changes:
             held |= {
-                "found_at": self._found_at,
+                "found_at": self._found.at,
                 "there": self.skin.there,
                 "area": self.skin.area,
                 "bend": self.skin.bend,
