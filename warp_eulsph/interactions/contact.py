@@ -19,6 +19,7 @@ from .law import make_push, make_raise, make_rate, skin_structure
 from .moved import Moved
 from .nearby import Nearby, matter_structure
 from .skin import Skin
+from .wetting_solids import find_wettings
 
 if TYPE_CHECKING:
     from ..scheme.world import World
@@ -110,6 +111,8 @@ class BoundContact(BoundInteraction):
     def start(self, world: "World") -> None:
         self._check_apart(world)
         self._leave_out_moving(world)
+        self._passed = wp.zeros(1, dtype=wp.float64, device=world.device)
+        self._wettings = find_wettings(world, self.assembly, self._felt)
         self.skin = Skin(world, self.assembly, self._names)
         self.nearby = Nearby(self.skin, self._felt, self._matter(world))
         self._arrays = skin_structure(self.space)()
@@ -187,6 +190,8 @@ class BoundContact(BoundInteraction):
                 )
 
     def rebuild(self, world: "World") -> None:
+        for wetting in self._wettings:
+            wetting.rebuild()
         self.skin.rebuild()
         self.nearby.forget()
 
@@ -222,6 +227,8 @@ class BoundContact(BoundInteraction):
         return self.nearby.pairs > 0
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
+        for wetting in self._wettings:
+            wetting.press(out)
         self._frequency.zero_()
         if self._push(world, state, fraction, out):
             self._measure(world, state)
@@ -235,6 +242,8 @@ class BoundContact(BoundInteraction):
         self._launch.once(make_raise(self.space), 1, [self._frequency, world.clock.fields])
 
     def advance(self, world: "World") -> None:
+        for wetting in self._wettings:
+            wetting.account(self._passed)
         if self.rubs and self.nearby.pairs:  # by normals and places of the last forces
             half, clock = world.half, world.clock.fields
             arguments = [self._arrays, self.nearby.rows, half.x, half.v, clock, self.option.friction, self.slip]
@@ -243,6 +252,9 @@ class BoundContact(BoundInteraction):
     def energy(self, world: "World") -> float:
         self.nearby.look(world.U, world.clock.fields)
         return float(self._energy.numpy().sum()) if self._push(world, world.U, 0.0, self._nothing) else 0.0
+
+    def passed(self) -> float:
+        return float(self._passed.numpy()[0])
 
     def evolving(self) -> dict[str, wp.array]:
         held = {"frequency": self._frequency} | ({"slip": self.slip} if self.rubs else {})
@@ -253,4 +265,6 @@ class BoundContact(BoundInteraction):
                 "area": self.skin.area,
                 "bend": self.skin.bend,
             }
+        for k, wetting in enumerate(self._wettings):
+            held |= {"passed": self._passed} | {f"{name}.{k}": array for name, array in wetting.evolving().items()}
         return held
