@@ -57,7 +57,9 @@ def build(across: int, wet: bool) -> Simulation:
         interactions = [Contact(between=[("water", "plate"), ("water", "ledge")])]
         for n in (1.0, -1.0):
             centre = (0.5 * (1.0 - n) * LENGTH, 0.0)
-            interactions.append(RigidBody(Plane(normal=(n, 0.0)), centre=centre, bodies=["water"], name=f"wall {n:.0f}"))
+            interactions.append(
+                RigidBody(Plane(normal=(n, 0.0)), centre=centre, bodies=["water"], name=f"wall {n:.0f}")
+            )
     scheme = Verlet(dissipation=Upwind(volume=True), correction=Uncorrected())
     return Simulation(bodies, boundaries=conditions, interactions=interactions, scheme=scheme)
 
