@@ -11,6 +11,7 @@ from warp_eulsph.cases import parse_case, read_case
 from warp_eulsph.validation.cases import (
     bar,
     bending_column,
+    container,
     drop,
     kinematic_vortex,
     piston,
@@ -29,6 +30,7 @@ PYTHON = {
     "bar_limited": (40, lambda n: bar.build(n, es.Always(), bar.LIMITED)),
     "bending_column": (6, lambda n: bending_column.build(2, n, es.Always())),
     "bending_column_3d": (3, lambda n: bending_column.build(3, n, es.Always())),
+    "container": (20, lambda n: container.build(n, 200.0)),
     "kinematic_vortex": (16, lambda n: kinematic_vortex.build(n, 2.0)),
     "piston": (50, lambda n: piston.build(n, piston.PISTONS["compression_100"], es.Always())),
     "punch": (10, lambda n: punch.build(n, es.Always())[0]),

@@ -154,8 +154,8 @@ class BoundContact(BoundInteraction):
         self.nearby.forget()
 
     def _find(self, x: wp.array) -> None:
-        """What is outermost now, where the arrangement is read anew and particles have moved."""
-        if self.skin.changes and self.nearby.moved(x, self._found_at):
+        """What is outermost now, where the arrangement is read anew and particles have moved, or a body has broken."""
+        if self.skin.changes and (self.skin.broke() or self.nearby.moved(x, self._found_at)):
             self.skin.find()
             wp.copy(self._found_at, x[self.skin.places].contiguous())
             self.nearby.forget()

@@ -64,6 +64,7 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
         near: Neighbours,
         cut: wp.array(dtype=wp.int32),
         fresh: wp.array(dtype=wp.int32),
+        frayed: wp.array(dtype=wp.int32),
     ):
         if fresh[0] == wp.static(WELL):
             return
@@ -83,6 +84,7 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
             moment += xi * near.own[k]
             K += wp.outer(xi, xi) * near.own[k]
         if lost > 0:
+            frayed[a] = 1
             reference.L[a] = invert(K)
             reference.diagonal[a] = diagonal
             if wp.static(tilted):
@@ -98,6 +100,7 @@ class Breaking:
 
     Attributes:
         first: place of the first particle that has failed, of one element.
+        cut, frayed: which are let go, and which lost a neighbour by that, (n,) int32; empty where arrangements move.
     """
 
     def __init__(self, space: Space, flux: Flux, configuration: Configuration, device: wp.DeviceLike):
@@ -109,6 +112,7 @@ class Breaking:
             )
         n = len(configuration.poor)
         self.cut = wp.zeros(n if configuration.fixed else 0, dtype=wp.int32, device=device)
+        self.frayed = wp.zeros_like(self.cut)
         self.first, self._fresh = (wp.full(1, WELL, dtype=wp.int32, device=device) for _ in range(2))
 
     def evolving(self) -> dict[str, wp.array]:
@@ -125,13 +129,18 @@ class Breaking:
                 self._launch(kernel, part.size, arguments, part.first)
         self._cut()
 
+    def grew(self) -> bool:
+        """Whether cracks may have grown since the last update but one; reads the device."""
+        return int(self._fresh.numpy()[0]) != WELL
+
     def rebuild(self) -> None:
         """Cut off again what was, after weights were made anew."""
         self._fresh.zero_()
+        self.frayed.zero_()
         self._cut()
 
     def _cut(self) -> None:
         if len(self.cut):
             fields, near = self.configuration.fields, self.configuration.near
-            arguments = [self.flux.particles, fields, near, self.cut, self._fresh]
+            arguments = [self.flux.particles, fields, near, self.cut, self._fresh, self.frayed]
             self._launch(_make_cut(self.space, self.configuration.tilt is not None), len(self.cut), arguments)
