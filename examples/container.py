@@ -4,8 +4,8 @@
     python examples/container.py -d 3                   in 3-D: minutes
 
 A box of 0.2 m, its walls 20 mm thick, flies at 100, 200 or 300 m/s flat against a wall; the steel yields at 350 MPa,
-tears at a plastic strain of 0.2, and the water (Tait's law, no tension) leaves through the openings. Prints what the wall
-took of the momentum, beside what the bodies lost, and the books; draws it at four times (``container.png``), and with
+tears at a plastic strain of 0.2, and water (Tait's law, no tension) leaves by openings. Prints what the wall took
+of the momentum, beside what the bodies lost, and the books; draws it at four times (``container.png``), and with
 ``--film`` all the way (``container.gif``).
 """
 

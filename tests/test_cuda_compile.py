@@ -13,7 +13,7 @@ from cubin import usage
 import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.interactions import Free, Sphere
-from warp_eulsph.materials import J2, IdealGas, JohnsonCook, MieGruneisen, Newtonian
+from warp_eulsph.materials import J2, DruckerPrager, IdealGas, JohnsonCook, MieGruneisen, Newtonian
 
 CASES = [
     pytest.param(3, wp.float32, 90),
@@ -38,6 +38,8 @@ def problems(dim, dtype):
     even = {"arrangement": es.Current(), "scheme": es.Verlet(shifting=es.Shifting())}
     for options in ({}, even):
         yield es.Simulation(yielding, boundaries=[fixed], dtype=dtype, **options)
+    sand = DruckerPrager(density=1800.0, young=20e6, poisson=0.25, friction=35.0, dilation=5.0)
+    yield es.Simulation(dataclasses.replace(yielding, material=sand), boundaries=[fixed], dtype=dtype, **even)
     place = [0.5] * (dim - 1) + [1.51]
     ball = es.RigidBody(Sphere(0.5), centre=place, motion=Free(mass=10.0, gravity=9.81), friction=0.3)
     yield es.Simulation(body, interactions=[ball], dtype=dtype)

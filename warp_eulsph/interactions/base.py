@@ -1,6 +1,7 @@
 """What an interaction declares: forces between bodies, or between bodies and something that moves beside them."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,6 +49,24 @@ class BoundInteraction(ABC):
     def rebuild(self, world: "World") -> None:  # noqa: B027
         """Derive what the evolving arrays determine, after they were overwritten or particles changed places."""
 
+    def prepare(self, world: "World") -> None:  # noqa: B027  (most need nothing of the host)
+        """Do what takes the host, such as a search, before a step and on its references; may read and allocate."""
+
+    def check(self, world: "World", running: wp.array) -> None:  # noqa: B027
+        """Set ``running`` to 0, if it is 1, where ``prepare`` has something to do; launches only.
+
+        In recorded steps it takes the place of ``prepare``, which the host then calls before it takes the step.
+        """
+
+    @property
+    def waiting(self) -> bool:
+        """Whether ``check`` set ``running`` to 0 since the last ``prepare``; reads the device."""
+        return False
+
+    def recorded_for(self) -> Sequence[object]:
+        """Objects that the launches of a step are of, which ``prepare`` may replace: steps are then recorded anew."""
+        return ()
+
     @abstractmethod
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
         """Add forces [N] at ``state``, at time t + fraction · Δt, to ``out``, (n,) of vec by place.
@@ -75,6 +94,10 @@ class BoundInteraction(ABC):
 
     def energy(self, world: "World") -> float:
         """Energy [J] that it holds at ``world.U``, kinetic energy of its own included; reads the device."""
+        return 0.0
+
+    def passed(self) -> float:
+        """Energy [J] that it put into what bodies store since the start, beside its work; reads the device."""
         return 0.0
 
     def supplied(self) -> float:

@@ -16,8 +16,10 @@ from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .friction import make_slip
 from .law import make_push, make_raise, make_rate, skin_structure
+from .moved import Moved
 from .nearby import Nearby
 from .skin import Skin
+from .wetting_solids import find_wettings
 
 if TYPE_CHECKING:
     from ..scheme.world import World
@@ -77,7 +79,7 @@ class BoundContact(BoundInteraction):
         skin, nearby: from ``start`` on; and slip: elastic slip of the skin's particles [m], (k,) of vec.
     """
 
-    sortable = True
+    sortable = recordable = True
 
     def __init__(self, option: Contact, assembly: Assembly):
         names, self.rubs = list(assembly.bodies), option.friction > 0.0
@@ -105,6 +107,8 @@ class BoundContact(BoundInteraction):
 
     def start(self, world: "World") -> None:
         self._check_apart(world)
+        self._passed = wp.zeros(1, dtype=wp.float64, device=world.device)
+        self._wettings = find_wettings(world, self.assembly, self._felt)
         self.skin = Skin(world, self.assembly, self._names)
         self.nearby = Nearby(self.skin, self._felt)
         self._arrays = skin_structure(self.space)()
@@ -115,9 +119,9 @@ class BoundContact(BoundInteraction):
         self._frequency = wp.zeros(1, dtype=self.space.real, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
         self.slip = wp.zeros(k if self.rubs else 0, dtype=self.space.vec, device=device)
-        self._found_at = wp.zeros(k if self.skin.changes else 0, dtype=self.space.vec, device=device)
-        if self.skin.changes:
-            wp.copy(self._found_at, world.U.x[self.skin.places].contiguous())
+        self._found = Moved(self.space, self.skin.places, self.nearby.moved.allowed)
+        self._found.note(world.U.x)
+        self.nearby.look(world.U, world.clock.fields)
         if self._push(world, world.U, 0.0, self._nothing):
             self._measure(world, world.U)
 
@@ -150,19 +154,36 @@ class BoundContact(BoundInteraction):
                 )
 
     def rebuild(self, world: "World") -> None:
+        for wetting in self._wettings:
+            wetting.rebuild()
         self.skin.rebuild()
         self.nearby.forget()
 
-    def _find(self, x: wp.array) -> None:
-        """What is outermost now, where the arrangement is read anew and particles have moved, or a body has broken."""
-        if self.skin.changes and (self.skin.broke() or self.nearby.moved(x, self._found_at)):
+    def prepare(self, world: "World") -> None:
+        """What is outermost now, where the arrangement is read anew or a crack grew, and what is near it."""
+        U, clock = world.U, world.clock
+        self.skin.tell(self._found.stale)
+        if self.skin.changes and self._found(U, clock.fields):
             self.skin.find()
-            wp.copy(self._found_at, x[self.skin.places].contiguous())
+            self._found.note(U.x)
             self.nearby.forget()
+        self.nearby.look(U, clock.fields, clock.option.growth)
+
+    def check(self, world: "World", running: wp.array) -> None:
+        if self.skin.changes:
+            self.skin.tell(self._found.stale)
+            self._found.check(world.U, world.clock.fields, 0.0, running)
+        self.nearby.moved.check(world.U, world.clock.fields, world.clock.option.growth, running)
+
+    @property
+    def waiting(self) -> bool:
+        return self._found.far or self.nearby.moved.far
+
+    def recorded_for(self) -> list[object]:
+        return [self.nearby.rows.index] if self.nearby.pairs else []
 
     def _push(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> bool:
         """Forces at ``state``, and the energy; whether there can be any."""
-        self.nearby.look(state.x)
         if self.nearby.pairs:
             self.skin.look(state)
             arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.clock.fields, fraction]
@@ -172,6 +193,8 @@ class BoundContact(BoundInteraction):
         return self.nearby.pairs > 0
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
+        for wetting in self._wettings:
+            wetting.press(out)
         self._frequency.zero_()
         if self._push(world, state, fraction, out):
             self._measure(world, state)
@@ -182,25 +205,32 @@ class BoundContact(BoundInteraction):
         self._launch(make_rate(self.space), len(self.skin.indices), arguments)
 
     def rate(self, world: "World") -> None:
-        self._find(world.U.x)
         self._launch.once(make_raise(self.space), 1, [self._frequency, world.clock.fields])
 
     def advance(self, world: "World") -> None:
+        for wetting in self._wettings:
+            wetting.account(self._passed)
         if self.rubs and self.nearby.pairs:  # by normals and places of the last forces
             half, clock = world.half, world.clock.fields
             arguments = [self._arrays, self.nearby.rows, half.x, half.v, clock, self.option.friction, self.slip]
             self._launch(make_slip(self.space), len(self.skin.indices), arguments)
 
     def energy(self, world: "World") -> float:
+        self.nearby.look(world.U, world.clock.fields)
         return float(self._energy.numpy().sum()) if self._push(world, world.U, 0.0, self._nothing) else 0.0
+
+    def passed(self) -> float:
+        return float(self._passed.numpy()[0])
 
     def evolving(self) -> dict[str, wp.array]:
         held = {"frequency": self._frequency} | ({"slip": self.slip} if self.rubs else {})
         if self.skin.changes:
             held |= {
-                "found_at": self._found_at,
+                "found_at": self._found.at,
                 "there": self.skin.there,
                 "area": self.skin.area,
                 "bend": self.skin.bend,
             }
+        for k, wetting in enumerate(self._wettings):
+            held |= {"passed": self._passed} | {f"{name}.{k}": array for name, array in wetting.evolving().items()}
         return held

@@ -226,8 +226,7 @@ def plane_moments(space: Space) -> wp.Function:
 def make_area(space: Space) -> wp.Kernel:
     """Kernel: the face of each outermost particle, 1/Σ_b φ_ab over those of its face, and how far these are from flat.
 
-    What was outermost before keeps both: energies that depend on them must not jump. Those ``alone`` are outermost, too,
-    and nobody's neighbours.
+    What was outermost before keeps both: energies that depend on them must not jump. Those ``alone`` are outermost too.
     """
     vec, real, dim, weight_of = space.vec, space.real, space.dim, surface_weight(space)[0]
     moments_of, eigen, order_of = plane_moments(space), symmetric_eigen(space), least_two(space)

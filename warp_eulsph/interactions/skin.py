@@ -175,9 +175,11 @@ class Skin:
         """Whether other particles may become outermost."""
         return any(layer.changes for layer in self._layers)
 
-    def broke(self) -> bool:
-        """Whether a crack grew in the last step; reads the device."""
-        return any(layer.breaking is not None and layer.breaking.grew() for layer in self._layers)
+    def tell(self, stale: wp.array) -> None:
+        """Set ``stale``, (1,) int32, to 1 if a crack grew in the last step; launches only."""
+        for layer in self._layers:
+            if layer.breaking is not None:
+                layer.breaking.tell(stale)
 
     def find_layers(self) -> None:
         """Which particles of the media are outermost."""

@@ -3,6 +3,7 @@
 from .bar import Bar
 from .base import Law, Material, Variable
 from .damage import Failure, JohnsonCookFailure, PlasticStrain, PrincipalStrain, PrincipalStress
+from .drucker_prager import DruckerPrager
 from .failing import Failing
 from .fluid import Fluid
 from .hardening import Hardening, JohnsonCook, LinearHardening, Tabulated, Voce
@@ -21,6 +22,7 @@ from .viscosity import Newtonian, PowerLaw, Viscosity
 __all__ = [
     "J2",
     "Bar",
+    "DruckerPrager",
     "Failing",
     "Failure",
     "Fluid",

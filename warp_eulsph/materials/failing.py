@@ -11,6 +11,7 @@ from ..linalg import det, inverse
 from ..space import Space
 from .base import Isotropic, Law, Material, Variable, history_row, lame_constants, long_form, positive
 from .damage import Failure
+from .drucker_prager import DruckerPrager
 
 DAMAGE = Variable("damage", "-", "0 whole, 1 failed: no more tension and shear", least=0.0)
 DRIVE = Variable("failure_drive", "-", "what the criterion has seen; 1 is the onset of damage", least=0.0)
@@ -42,6 +43,10 @@ class Failing(Material):
             raise TypeError(f"material must be a law with young and poisson, got {self.material!r}")
         if self.material.linear:
             raise ValueError(f"{type(self.material).__name__} is for small turns; pieces of what breaks turn")
+        if isinstance(self.material, DruckerPrager):
+            raise ValueError(
+                "DruckerPrager opens by its own tension cut-off, and what has failed would forget how it dilated"
+            )
         positive("layers", self.layers, "1")
         object.__setattr__(self, "density", self.material.density)
         names = {variable.name for variable in self.material.law(Space(3)).history}

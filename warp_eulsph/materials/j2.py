@@ -7,18 +7,12 @@ from typing import Any
 
 import warp as wp
 
-from ..linalg import det, inverse, reciprocal_cube_root, symmetric_bounds
+from ..linalg import det, inverse
 from ..space import Space, matrix_type
 from .base import Isotropic, Law, Variable, history_row, lame_constants
 from .hardening import Hardening
-from .log_strain import deviatoric_logarithm, exponential
+from .plastic_metric import METRIC, elastic_kinematics
 
-METRIC = Variable(
-    "plastic_metric",
-    "-",
-    "inverse plastic metric C_p^-1 since the last rebasing, out-of-plane parts included",
-    start=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
-)
 STRAIN = Variable("plastic_strain", "-", "equivalent plastic strain", least=0.0)
 WORK = Variable("plastic_work", "J/m^3", "plastic work per initial volume", least=0.0)
 # Rounds of the bracketed search for a plastic increment; ten do where the yield stress is smooth.
@@ -55,22 +49,6 @@ class J2(Isotropic):
             start = self.hardening.heat(self.density)[0]
             history = (*history, Variable("temperature", "K", "temperature; no heat is conducted", start, 0.0))
         return _law(space, type(self.hardening), sizes, history)
-
-
-@functools.cache
-def in_three_dimensions(space: Space) -> wp.Function:
-    """``wp.func`` F with the missing stretches of one, 3 × 3."""
-    mat, full, real, dim = space.mat, matrix_type(3, 3, space.real), space.real, space.dim
-
-    @wp.func
-    def in_three_dimensions(F: mat) -> full:
-        out = wp.identity(n=3, dtype=real)
-        for i in range(wp.static(dim)):
-            for j in range(wp.static(dim)):
-                out[i, j] = F[i, j]
-        return out
-
-    return in_three_dimensions
 
 
 @functools.cache
@@ -124,31 +102,16 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
     Constants = wp.struct(type("Constants", (), {"__annotations__": annotations, "__module__": __name__}))
     yield_stress = hardening.make_yield_stress(real, Constants)
     increment, shortened = _return_mapping(real, Constants, yield_stress), math.sqrt(1.5)
-    determinant, invert, bounds = det(space), inverse(space), symmetric_bounds(space)
-    logarithm, exp, root = deviatoric_logarithm(real), exponential(real), reciprocal_cube_root(real)
-    extended, heats = in_three_dimensions(space), hardening.heats
+    determinant, invert, heats = det(space), inverse(space), hardening.heats
     law = Law(Constants, None, None, None, history=history)
     row = history_row(space, law)
-
-    @wp.func
-    def left_elastic(F: mat, h: row) -> full:
-        """b_e = F C_p⁻¹ Fᵀ."""
-        G = extended(F)
-        return G @ full(h[0], h[3], h[4], h[3], h[1], h[5], h[4], h[5], h[2]) @ wp.transpose(G)
+    trial, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
 
     @wp.func
     def temperature(h: row) -> real:
         if wp.static(heats):
             return h[8]
         return real(0.0)
-
-    @wp.func
-    def in_space(A: full) -> mat:
-        out = mat()
-        for i in range(wp.static(dim)):
-            for j in range(wp.static(dim)):
-                out[i, j] = A[i, j]
-        return out
 
     @wp.func
     def flow(e: full, h: row, dt: real, c: Constants) -> pair:
@@ -161,7 +124,7 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
 
     @wp.func
     def stress(F: mat, rate: mat, h: row, dt: real, c: Constants) -> mat:
-        e = logarithm(left_elastic(F, h)) * real(0.5)
+        e = trial(F, h)
         e = e * (real(2.0) * c.mu * flow(e, h, dt, c)[1])
         pressure = wp.identity(n=wp.static(dim), dtype=real) * (c.kappa * wp.log(determinant(F)))
         tau = pressure + in_space(e)
@@ -169,30 +132,17 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
 
     @wp.func
     def energy(F: mat, h: row, c: Constants) -> real:
-        e = logarithm(left_elastic(F, h)) * real(0.5)
+        e = trial(F, h)
         volumetric = wp.log(determinant(F))
         return real(0.5) * c.kappa * volumetric * volumetric + c.mu * wp.ddot(e, e)
 
     @wp.func
     def wave_moduli(F: mat, h: row, c: Constants) -> pair:
-        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) with x = 2 (e_i − e_j) for shear
-        J = determinant(F)
-        b = bounds(in_space(left_elastic(F, h)))
-        largest = wp.log(b[1])
-        least = b[0]
-        if wp.static(dim == 3):
-            least = wp.max(least, J * J / (b[1] * b[1]))  # the bound may be negative, the determinant is J²
-        least = wp.log(least)
-        volumetric = wp.log(J)
-        spread = largest - least
-        tau = c.kappa * volumetric + c.mu * (least - real(2.0) / real(3.0) * volumetric)
-        shear = c.mu * (real(1.0) + spread)
-        M = c.kappa + real(4.0) / real(3.0) * c.mu * (real(1.0) + real(0.25) * spread * spread)
-        return pair(wp.max(M - tau, shear), shear)
+        return moduli(F, h, c.kappa * wp.log(determinant(F)), c.mu, c.kappa)
 
     @wp.func
     def update(F: mat, rate: mat, h: row, dt: real, c: Constants):
-        e = logarithm(left_elastic(F, h)) * real(0.5)
+        e = trial(F, h)
         found = flow(e, h, dt, c)
         delta = found[0]
         if delta == real(0.0):
@@ -201,15 +151,7 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
         T = temperature(h)
         y = yield_stress(h[6], speed, T, c) + yield_stress(h[6] + delta, speed, T, c)
         work = real(0.5) * y * delta
-        J = determinant(F)
-        G = wp.inverse(extended(F)) * (J * root(J) * root(J))
-        C = G @ exp(e * (real(2.0) * found[1])) @ wp.transpose(G)
-        out = h
-        for k in range(3):
-            out[k] = C[k, k]
-        out[3] = C[0, 1]
-        out[4] = C[0, 2]
-        out[5] = C[1, 2]
+        out = flowed(F, h, e * found[1])
         out[6] = h[6] + delta
         out[7] = h[7] + work
         if wp.static(heats):
@@ -218,20 +160,7 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
 
     @wp.func
     def rebase(F: mat, h: row, c: Constants):
-        out = h
-        F_e = F
-        if wp.static(dim > 1):
-            J = determinant(F)
-            V = exp(logarithm(left_elastic(F, h)) * real(0.5)) * (J * root(J) * root(J))
-            s = real(1.0)
-            if wp.static(dim == 2):
-                s = wp.sqrt(V[2, 2])  # so that det F stays J
-            F_e = in_space(V) * s
-            for k in range(6):
-                out[k] = real(0.0)
-            out[0] = real(1.0) / (s * s)
-            out[1] = out[0]
-            out[2] = s * s * s * s
+        F_e, out = rebased(F, h)
         return F_e, out
 
     @wp.func

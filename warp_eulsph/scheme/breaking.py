@@ -95,6 +95,12 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
     return cut_pairs
 
 
+@wp.kernel(module="unique", enable_backward=False)
+def _tell(fresh: wp.array(dtype=wp.int32), grew: wp.array(dtype=wp.int32)):
+    if fresh[0] != wp.static(WELL):
+        grew[0] = 1
+
+
 class Breaking:
     """At work on a medium one of whose laws has ``failed``.
 
@@ -129,9 +135,9 @@ class Breaking:
                 self._launch(kernel, part.size, arguments, part.first)
         self._cut()
 
-    def grew(self) -> bool:
-        """Whether cracks may have grown since the last update but one; reads the device."""
-        return int(self._fresh.numpy()[0]) != WELL
+    def tell(self, grew: wp.array) -> None:
+        """Set ``grew``, (1,) int32, to 1 if particles were cut off in the last update; launches only."""
+        self._launch.once(_tell, 1, [self._fresh, grew])
 
     def rebuild(self) -> None:
         """Cut off again what was, after weights were made anew."""

@@ -1,0 +1,126 @@
+"""Kinematics of finite plasticity (M18, M20 in docs/method.md): F = F_e F_p, kept as F and C_p⁻¹ = F_p⁻¹ F_p⁻ᵀ.
+
+For isotropic laws whose plastic flow is coaxial with the elastic strain e = ln V_e. C_p⁻¹ keeps det C_p⁻¹ = 1: what a
+law does to volume is a number of its own.
+"""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from ..linalg import det, reciprocal_cube_root, symmetric_bounds
+from ..space import Space, matrix_type
+from .base import Variable
+from .log_strain import deviatoric_logarithm, exponential
+
+#: Begins the history of a law that flows.
+METRIC = Variable(
+    "plastic_metric",
+    "-",
+    "inverse plastic metric C_p^-1 since the last rebasing, out-of-plane parts included",
+    start=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+)
+
+
+class Kinematics(NamedTuple):
+    """Functions, all ``wp.func``, of F and a row h of history that ``METRIC`` begins; full is 3 × 3 in any dimension.
+
+    Attributes:
+        trial: (F, h) -> dev e (full).
+        flowed: (F, h, dev e) -> h whose C_p⁻¹ leaves this of the elastic strain.
+        rebased: (F, h) -> (F, h) of the same det F and dev e, with what is left of F after plastic flow.
+        moduli: (F, h, t, μ, κ) -> (M, μ_s) as ``Law.wave_moduli``, t = tr τ/3, of Ψ = ψ(ln J) + μ |dev e|², ψ'' = κ.
+        in_space: full -> its part in the space.
+    """
+
+    trial: wp.Function
+    flowed: wp.Function
+    rebased: wp.Function
+    moduli: wp.Function
+    in_space: wp.Function
+
+
+@functools.cache
+def elastic_kinematics(space: Space, row: Any) -> Kinematics:
+    """The functions for rows of history of this type."""
+    real, mat, pair, dim = space.real, space.mat, space.row(2), space.dim
+    full = matrix_type(3, 3, real)
+    determinant, bounds, root = det(space), symmetric_bounds(space), reciprocal_cube_root(real)
+    logarithm, exp = deviatoric_logarithm(real), exponential(real)
+
+    @wp.func
+    def extended(F: mat) -> full:
+        """F with the missing stretches of one."""
+        out = wp.identity(n=3, dtype=real)
+        for i in range(wp.static(dim)):
+            for j in range(wp.static(dim)):
+                out[i, j] = F[i, j]
+        return out
+
+    @wp.func
+    def in_space(A: full) -> mat:
+        out = mat()
+        for i in range(wp.static(dim)):
+            for j in range(wp.static(dim)):
+                out[i, j] = A[i, j]
+        return out
+
+    @wp.func
+    def left_elastic(F: mat, h: row) -> full:
+        """b_e = F C_p⁻¹ Fᵀ."""
+        G = extended(F)
+        return G @ full(h[0], h[3], h[4], h[3], h[1], h[5], h[4], h[5], h[2]) @ wp.transpose(G)
+
+    @wp.func
+    def trial(F: mat, h: row) -> full:
+        return logarithm(left_elastic(F, h)) * real(0.5)
+
+    @wp.func
+    def flowed(F: mat, h: row, e: full) -> row:
+        J = determinant(F)
+        G = wp.inverse(extended(F)) * (J * root(J) * root(J))
+        C = G @ exp(e * real(2.0)) @ wp.transpose(G)
+        out = h
+        for k in range(3):
+            out[k] = C[k, k]
+        out[3] = C[0, 1]
+        out[4] = C[0, 2]
+        out[5] = C[1, 2]
+        return out
+
+    @wp.func
+    def rebased(F: mat, h: row):
+        out = h
+        F_e = F
+        if wp.static(dim > 1):
+            J = determinant(F)
+            V = exp(trial(F, h)) * (J * root(J) * root(J))
+            s = real(1.0)
+            if wp.static(dim == 2):
+                s = wp.sqrt(V[2, 2])  # so that det F stays J
+            F_e = in_space(V) * s
+            for k in range(6):
+                out[k] = real(0.0)
+            out[0] = real(1.0) / (s * s)
+            out[1] = out[0]
+            out[2] = s * s * s * s
+        return F_e, out
+
+    @wp.func
+    def moduli(F: mat, h: row, t: real, mu: real, kappa: real) -> pair:
+        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) with x = 2 (e_i − e_j) for shear
+        J = determinant(F)
+        b = bounds(in_space(left_elastic(F, h)))
+        largest = wp.log(b[1])
+        least = b[0]
+        if wp.static(dim == 3):
+            least = wp.max(least, J * J / (b[1] * b[1]))  # the bound may be negative, the determinant is J²
+        least = wp.log(least)
+        spread = largest - least
+        tau = t + mu * (least - real(2.0) / real(3.0) * wp.log(J))
+        shear = mu * (real(1.0) + spread)
+        M = kappa + real(4.0) / real(3.0) * mu * (real(1.0) + real(0.25) * spread * spread)
+        return pair(wp.max(M - tau, shear), shear)
+
+    return Kinematics(trial, flowed, rebased, moduli, in_space)
