@@ -51,7 +51,7 @@ def figures(found: dict[str, float]) -> list[Figure]:
         Figure("momentum that is missing / start", found["missing"], 0.0, 1e-12, 0.0),
         Figure("plastic work and damage / energy", found["plastic"], 0.0, 1.0),
         Figure("dissipation (M9) / energy", found["dissipation"], 0.0, 0.4),
-        Figure("account of the contacts / energy", found["account"], -0.03, 0.01, 0.0),
+        Figure("account of the contacts / energy", found["account"], -0.06, 0.01, 0.0),
         Figure("ledger residual / energy", found["residual"], 0.0, 1e-12, 0.0),
         Figure("steel that has failed", found["failed"], 0.01, 1.0),
     ]

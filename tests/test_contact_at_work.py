@@ -162,8 +162,8 @@ def test_bad_set_ups_get_one_clear_error():
     inside = es.Body(x=rectangle(2, 2, h, (0.35, 0.35)), volume=h * h, material=SOFT, name="two")
     with pytest.raises(ValueError, match="must not lie in each other"):
         es.Simulation([one, inside], interactions=[es.Contact()])
-    with pytest.raises(ValueError, match="two bodies that are not bonded are needed"):
-        es.Simulation([one], interactions=[es.Contact()])
+    with pytest.raises(ValueError, match="two bodies that are not bonded, or one whose arrangement stays"):
+        es.Simulation([one], interactions=[es.Contact()], arrangement=es.Current())
     apart = es.Body(x=rectangle(8, 8, h, (0.0, 2.0)), volume=h * h, material=SOFT, name="two")
     with pytest.raises(ValueError, match=r"bodies must be among \['one', 'two'\], got 'tow'"):
         es.Simulation([one, apart], interactions=[es.Contact(between=[("one", "tow")])])

@@ -90,5 +90,5 @@ def test_a_container_bursts_with_closed_books(speed):
     found = container.found_at(20, speed)
     assert found["missing"] < 1e-12 and found["residual"] < 1e-12
     # Planes through particles that came apart made it 0.3 to 1200 times the energy, from nothing
-    assert -0.03 < found["account"] < 0.005
+    assert -0.06 < found["account"] < 0.005
     assert 0.8 < found["momentum"] < 1.1 and found["failed"] > 0.05

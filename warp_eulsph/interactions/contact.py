@@ -1,10 +1,10 @@
-"""Contact of bodies: they push each other where they touch, and do not pass through."""
+"""Contact of bodies, and of a body with itself: they push where they touch, and do not pass through."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from typing import TYPE_CHECKING
+from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -17,7 +17,7 @@ from .base import BoundInteraction, Interaction
 from .friction import make_slip
 from .law import make_push, make_raise, make_rate, skin_structure
 from .moved import Moved
-from .nearby import Nearby
+from .nearby import Nearby, matter_structure
 from .skin import Skin
 from .wetting_solids import find_wettings
 
@@ -42,13 +42,18 @@ class Contact(Interaction):
     around. Pairs are antisymmetric in every bit. Friction is Coulomb's: half cells are sheared elastically until the
     stress is ``friction`` times the pressure, then they slide..
 
+    A body whose arrangement stays that of the start touches itself, too, where it folds, is crushed, or a notch closes:
+    matter that neither feels each other by weights nor would by this law at the start. Where the arrangement is read
+    anew what meets becomes neighbours.
+
     Args:
-        between: pairs of names of bodies that touch each other; all with all if None. Bonded bodies are one.
+        between: pairs of names of bodies that touch each other, ("ring", "ring") for one that touches itself; all with
+            all, and with themselves, if None. Bonded bodies are one.
         friction: Coulomb's coefficient, 0 without. Pairs that differ in it are a ``Contact`` each.
 
     Raises:
-        ValueError: when the simulation is built: unknown names, one body, a periodic box, bodies that lie in each other
-            at the start, or one without outermost particles (at least two particles thick).
+        ValueError: when the simulation is built: unknown names, nothing that can touch, a periodic box, bodies that lie
+            in each other at the start, or one without outermost particles (at least two particles thick).
     """
 
     between: Sequence[tuple[str, str]] | None = None
@@ -59,7 +64,7 @@ class Contact(Interaction):
             raise ValueError(f"Contact: friction must be 0 or more and finite, got {self.friction}")
         if self.between is not None:
             named = [tuple(two) if not isinstance(two, str) else (two,) for two in self.between]
-            wrong = [two for two in named if len(two) != 2 or two[0] == two[1]]
+            wrong = [two for two in named if len(two) != 2]
             if wrong or not named:
                 raise ValueError(
                     'Contact: between must be pairs of names of two bodies such as [("left", "right")], got '
@@ -90,14 +95,12 @@ class BoundContact(BoundInteraction):
             raise ValueError("Contact: periodic boxes are not for bodies that touch; leave out periodic=...")
         first = [own.start for own in assembly.bodies.values()]
         groups = assembly.particles.group.numpy()[first]
-        chosen = option.between or list(combinations(names, 2))
+        chosen = option.between or list(combinations_with_replacement(names, 2))
         numbers = [(names.index(one), names.index(other)) for one, other in chosen]
         self._felt = np.zeros((len(names), len(names)), dtype=np.int32)
         for i, j in numbers:
-            self._felt[i, j] = self._felt[j, i] = groups[i] != groups[j]
-        self.touching = frozenset((names[i], names[j]) for i, j in np.argwhere(self._felt).tolist())
-        if not self.touching:
-            raise ValueError(f"Contact: two bodies that are not bonded are needed, got {names}")
+            self._felt[i, j] = self._felt[j, i] = 1 if groups[i] != groups[j] else 2
+        self.touching = frozenset((names[i], names[j]) for i, j in np.argwhere(self._felt == 1).tolist())
         self._names = [name for k, name in enumerate(names) if self._felt[k].any()]
         self.indices = np.concatenate([np.arange(own.start, own.stop) for own in self._ranges()]).astype(np.int32)
         self._launch = Launcher(assembly.device)
@@ -107,10 +110,11 @@ class BoundContact(BoundInteraction):
 
     def start(self, world: "World") -> None:
         self._check_apart(world)
+        self._leave_out_moving(world)
         self._passed = wp.zeros(1, dtype=wp.float64, device=world.device)
         self._wettings = find_wettings(world, self.assembly, self._felt)
         self.skin = Skin(world, self.assembly, self._names)
-        self.nearby = Nearby(self.skin, self._felt)
+        self.nearby = Nearby(self.skin, self._felt, self._matter(world))
         self._arrays = skin_structure(self.space)()
         for name in ("places", "there", "area", "half", "modulus", "shear_modulus", "normal", "bend"):
             setattr(self._arrays, name, getattr(self.skin, name))
@@ -124,6 +128,38 @@ class BoundContact(BoundInteraction):
         self.nearby.look(world.U, world.clock.fields)
         if self._push(world, world.U, 0.0, self._nothing):
             self._measure(world, world.U)
+
+    def _leave_out_moving(self, world: "World") -> None:
+        """Bodies whose arrangement is read anew do not touch themselves."""
+        names = list(self.assembly.bodies)
+        fixed = np.concatenate([np.full(medium.n, medium.configuration.fixed) for medium in world.media])
+        stays = fixed[[own.start for own in self.assembly.bodies.values()]]
+        moving = [names[k] for k in np.flatnonzero((np.diag(self._felt) == 2) & ~stays)]
+        if moving and self.option.between is not None:
+            raise ValueError(
+                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew; what meets "
+                "there becomes neighbours. Leave them out of between, or build with arrangement=Convected()"
+            )
+        self._felt[(self._felt == 2) & ~stays] = 0
+        if not self._felt.any():
+            raise ValueError(
+                "Contact: two bodies that are not bonded, or one whose arrangement stays, which may touch itself, are "
+                f"needed, got {names}"
+            )
+
+    def _matter(self, world: "World") -> Any:
+        order, indices, device = self.assembly.order, self.skin.indices, world.device
+        support = np.concatenate([np.full(medium.n, medium.configuration.lists.support) for medium in world.media])
+        matter = matter_structure(self.space)()
+        for name, values in {
+            "X": self.assembly.X,
+            "outward": order.by_number(world.particles.outward.numpy()),
+            "spacing": order.by_number(world.particles.spacing.numpy()),
+            "support": order.by_number(support * world.particles.h.numpy()),
+        }.items():
+            dtype = self.space.real if values.ndim == 1 else self.space.vec
+            setattr(matter, name, wp.array(values[indices], dtype=dtype, device=device))
+        return matter
 
     def _check_apart(self, world: "World") -> None:
         """Raise ValueError where two bodies lie in each other."""
