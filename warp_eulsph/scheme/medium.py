@@ -92,7 +92,6 @@ class Medium:
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
-            _check_bonds(parts.groups, True, "shifting")
             held = _held(conditions, self.span)
             self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
@@ -212,7 +211,10 @@ class Medium:
 
     def stabilise(self, state: StateArrays) -> None:
         """Prepare the stabiliser for a new reference, and what else depends on it."""
-        self.stabiliser.refresh(self.configuration, self.of(state))
+        U = self.of(state)
+        self.stabiliser.refresh(self.configuration, U)
+        if self.shifter is not None:
+            self.shifter.look(self.configuration, self.stabiliser.defect, U)
         self._derive()
 
     def rebuild(self) -> None:

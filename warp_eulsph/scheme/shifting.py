@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from ..execution import Launcher
-from ..fields import clock_structure, structure
+from ..fields import clock_structure, neighbour_structure, structure
 from ..linalg import inverse
 from ..space import Space
 from ..structs import ClockArrays, ParticleArrays, StateArrays
@@ -18,9 +18,10 @@ from .laws import Part
 from .projection import Projection, pad
 from .reference import Configuration
 
-# Next to a surface, where |s_a| exceeds this share of a particle's face, nothing is shifted: there sums are one-sided,
-# and so is the defect that says where to go. In lattices that is so in the outermost three layers.
-NEAR_SURFACE = 0.05
+# A particle is at a free surface where |e_a| exceeds this share of its own face: at flat faces of lattices |e_a| is 1.2
+# (Wendland C2, dilation 1.8) to 1.4 (cubic spline, 1.3) of it, inside a flow that mixes at most 0.7
+# (``tests/test_shifting.py``).
+EXPOSED = 0.8
 # Least value of what has none: a constant of a kernel must be finite, in float32 too.
 NO_BOUND = -1e38
 
@@ -31,8 +32,9 @@ class Shifting:
 
     It keeps the arrangement even where stress is several times the modulus, for shear without end. It is not exact: a
     remap changes energy (account "shifting"), by some 1e-4 in bodies that need none. Momenta are kept by the least
-    change. Particles near surfaces and those with velocity conditions stay. Positions of material points are not
-    carried: conditions given by initial positions keep those of the particles.
+    change. Particles with velocity conditions stay, and so do those at a free surface, or beside another body that
+    they are bonded to, and all their neighbours: there sums are one-sided, and so is what says where to go. Positions
+    of material points are not carried: conditions given by initial positions keep those of the particles.
 
     Args:
         rate: share of ½ψ taken in one refresh; 1 is the tested value.
@@ -64,7 +66,6 @@ def _make_shift(space: Space) -> wp.Kernel:
     Nothing moves once the target time is reached or the run has failed.
     """
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
-    face = float(dim - 1) / float(dim)
     rows, invert, padded = space.row_gradient(dim**2), inverse(space), pad(space)
     Particles, Reference, State = (
         structure(space, "Particles"),
@@ -81,6 +82,7 @@ def _make_shift(space: Space) -> wp.Kernel:
         clock: Clock,
         psi: wp.array(dtype=vec),
         free: wp.array(dtype=wp.int32),
+        stays: wp.array(dtype=wp.int32),
         grad_v: wp.array(dtype=mat),
         grad_F: wp.array(dtype=rows),
         rate: real,
@@ -96,9 +98,8 @@ def _make_shift(space: Space) -> wp.Kernel:
         most = bound * particles.spacing[a] * reference.h[a] / particles.h[a]
         if length > most:
             delta = delta * (most / length)
-        surface = wp.length(state.surface[a])
         running = clock.bad[0] == WELL and clock.t[0] < clock.target[0]
-        if not running or free[a] == 0 or surface > real(NEAR_SURFACE) * wp.pow(reference.V[a], real(face)):
+        if not running or free[a] == 0 or stays[a] != 0:
             delta = vec()
         out[a] = delta
         mass = particles.mass[a]
@@ -114,6 +115,58 @@ def _make_shift(space: Space) -> wp.Kernel:
         state.x[a] = state.x[a] + moved
 
     return shift
+
+
+@functools.cache
+def _make_expose(space: Space) -> wp.Kernel:
+    """Kernel: which particles are at a free surface, by e_a = ``defect`` + s_a; those that are held are at none."""
+    real, vec, dim = space.real, space.vec, space.dim
+    most = EXPOSED**dim
+    Reference, State = structure(space, "Reference"), structure(space, "State")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def expose(
+        first: int,
+        reference: Reference,
+        state: State,
+        defect: wp.array(dtype=vec),
+        free: wp.array(dtype=wp.int32),
+        exposed: wp.array(dtype=wp.int32),
+    ):
+        a = first + wp.tid()
+        length = wp.length(defect[a] + state.surface[a])
+        share = length  # |e|ᵈ/Vᵈ⁻¹, the d-th power of |e| over the face
+        for _ in range(wp.static(dim - 1)):
+            share *= length / reference.V[a]
+        exposed[a] = 0
+        if free[a] != 0 and share > real(most):
+            exposed[a] = 1
+
+    return expose
+
+
+@functools.cache
+def _make_stay(space: Space) -> wp.Kernel:
+    """Kernel: which particles are not shifted: at a free surface, beside another body, or neighbours of those."""
+    Particles, Neighbours = structure(space, "Particles"), neighbour_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def stay(
+        first: int,
+        particles: Particles,
+        near: Neighbours,
+        exposed: wp.array(dtype=wp.int32),
+        stays: wp.array(dtype=wp.int32),
+    ):
+        a = first + wp.tid()
+        found = exposed[a]
+        for k in range(near.start[a], near.start[a + 1]):
+            b = near.index[k]
+            if exposed[b] != 0 or particles.body[b] != particles.body[a]:
+                found = 1
+        stays[a] = found
+
+    return stay
 
 
 @functools.cache
@@ -189,12 +242,20 @@ class Shifter:
         free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
+        self.exposed, self.stays = (wp.zeros(n, dtype=wp.int32, device=device) for _ in range(2))
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
         self.projection = Projection(space, particles, flux.bodies, device)
 
     def evolving(self) -> dict[str, wp.array]:
-        """Which particles may be shifted: no step changes it, but particles change places."""
-        return {"Shifter.free": self.free}
+        """Which particles may be shifted: for good, and before the next refresh."""
+        return {"Shifter.free": self.free, "Shifter.stays": self.stays}
+
+    def look(self, configuration: Configuration, defect: wp.array, U: StateArrays) -> None:
+        """Who stays until the next refresh, by the ``defect`` e_a − s_a [m^(d−1)] of this one."""
+        arguments = [configuration.fields, U, defect, self.free, self.exposed]
+        self._launch(_make_expose(self.space), len(defect), arguments)
+        arguments = [self.particles, configuration.near, self.exposed, self.stays]
+        self._launch(_make_stay(self.space), len(defect), arguments)
 
     def apply(
         self,
@@ -207,7 +268,7 @@ class Shifter:
     ) -> None:
         """Shift the particles of ``U``, whose gradients in the reference are given; ψ [m] are its potentials (M13)."""
         option, n, reference = self.option, len(psi), configuration.fields
-        arguments = [self.particles, reference, clock, psi, self.free, grad_v, grad_F, option.rate, option.bound, U]
+        arguments = [self.particles, reference, clock, psi, self.free, self.stays, grad_v, grad_F, option.rate, option.bound, U]
         arguments += [self._moved, self.impulse, self.projection.couples]
         self._launch(_make_shift(self.space), n, arguments)
         for remap in self._remaps:

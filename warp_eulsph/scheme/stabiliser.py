@@ -51,8 +51,9 @@ class Stabiliser(ABC):
 
     #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
     corrects: ClassVar[bool] = True
-    #: Potentials [m], (n,) of vec, of corrections that have them.
+    #: Potentials [m], (n,) of vec, of corrections that have them, and the defect e_a − s_a [m^(d−1)] that they are of.
     psi: wp.array
+    defect: wp.array
 
     @abstractmethod
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
