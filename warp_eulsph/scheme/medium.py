@@ -18,6 +18,7 @@ from .dual_forces import DualForces
 from .flux import Flux
 from .heating import Heating
 from .limiter import MassDiffusion
+from .opening import make_face
 from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
 from .reference import Configuration
@@ -187,10 +188,12 @@ class Medium:
         self.configuration.refresh(self.of(state))
 
     def find_surface(self, state: StateArrays) -> None:
-        """s_a = e_a at the start (M10)."""
-        nothing_yet = self.forces.free_v
+        """s_a at the start (M10): e_a, and where balanced (M13) the faces of particles at free surfaces by it."""
+        nothing_yet, surface = self.forces.free_v, self.of(state).surface
         unit = None if self.sharpener is None else self.sharpener.unit()
-        self.configuration.defect(nothing_yet, self.of(state).surface, unit)
+        self.configuration.defect(nothing_yet, surface, unit)
+        if self.stabiliser.finds_faces:
+            self._launch(make_face(self.space), self.n, [self.configuration.fields, surface])
 
     def look_outward(self, state: StateArrays) -> None:
         """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""

@@ -15,13 +15,10 @@ from ..structs import ClockArrays, ParticleArrays, StateArrays
 from .flux import Flux
 from .health import WELL
 from .laws import Part
+from .opening import is_exposed
 from .projection import Projection, pad
 from .reference import Configuration
 
-# A particle is at a free surface where |e_a| exceeds this share of its own face: at flat faces of lattices |e_a| is 1.2
-# (Wendland C2, dilation 1.8) to 1.4 (cubic spline, 1.3) of it, inside a flow that mixes at most 0.7
-# (``tests/test_shifting.py``).
-EXPOSED = 0.8
 # Least value of what has none: a constant of a kernel must be finite, in float32 too.
 NO_BOUND = -1e38
 
@@ -120,8 +117,7 @@ def _make_shift(space: Space) -> wp.Kernel:
 @functools.cache
 def _make_expose(space: Space) -> wp.Kernel:
     """Kernel: which particles are at a free surface, by e_a = ``defect`` + s_a; those that are held are at none."""
-    real, vec, dim = space.real, space.vec, space.dim
-    most = EXPOSED**dim
+    vec, exposed_by = space.vec, is_exposed(space)
     Reference, State = structure(space, "Reference"), structure(space, "State")
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -134,12 +130,8 @@ def _make_expose(space: Space) -> wp.Kernel:
         exposed: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
-        length = wp.length(defect[a] + state.surface[a])
-        share = length  # |e|ᵈ/Vᵈ⁻¹, the d-th power of |e| over the face
-        for _ in range(wp.static(dim - 1)):
-            share *= length / reference.V[a]
         exposed[a] = 0
-        if free[a] != 0 and share > real(most):
+        if free[a] != 0 and exposed_by(defect[a] + state.surface[a], reference.V[a]):
             exposed[a] = 1
 
     return expose
@@ -268,7 +260,19 @@ class Shifter:
     ) -> None:
         """Shift the particles of ``U``, whose gradients in the reference are given; ψ [m] are its potentials (M13)."""
         option, n, reference = self.option, len(psi), configuration.fields
-        arguments = [self.particles, reference, clock, psi, self.free, self.stays, grad_v, grad_F, option.rate, option.bound, U]
+        arguments = [
+            self.particles,
+            reference,
+            clock,
+            psi,
+            self.free,
+            self.stays,
+            grad_v,
+            grad_F,
+            option.rate,
+            option.bound,
+            U,
+        ]
         arguments += [self._moved, self.impulse, self.projection.couples]
         self._launch(_make_shift(self.space), n, arguments)
         for remap in self._remaps:
