@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
+from ..atomics import lower_to
 from ..fields import neighbour_structure, structure
 from ..linalg import det, inverse
 from ..operators.row_sums import laplacian_sum, outer_sum
@@ -14,7 +15,6 @@ from ..structs import ParticleArrays, StateArrays
 from .dissipation import UpwindForces
 from .flux import Flux
 from .health import WELL
-from .opening import make_renew
 from .reference import Configuration, reference_spacing
 from .stabiliser import Correction
 
@@ -22,6 +22,9 @@ from .stabiliser import Correction
 # rounded down (at dilation 1.3, in 1-D at 1.2 too; `python -m warp_eulsph.validation.balance_sweeps`). What is
 # corrected too far repels in tension, pairs in compression.
 RELAXATION = {1: 0.52, 2: 0.75, 3: 0.85}
+
+# A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
+OPENED = 1.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,37 @@ class Balance(Correction):
     def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "BalancedPairs":
         """Allocate."""
         return BalancedPairs(self, space, particles, device)
+
+
+@functools.cache
+def _make_renew(space: Space) -> wp.Kernel:
+    """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13).
+
+    ``torn`` takes the place of the first particle with a new face.
+    """
+    real, vec = space.real, space.vec
+    Reference, dim = structure(space, "Reference"), space.dim
+    most = OPENED**dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def renew(
+        first: int,
+        reference: Reference,
+        defect: wp.array(dtype=vec),
+        surface: wp.array(dtype=vec),
+        torn: wp.array(dtype=wp.int32),
+    ):
+        a = first + wp.tid()
+        opening = wp.length(defect[a])  # |d|ᵈ/Vᵈ⁻¹, the d-th power of |d| over the face: no root to take
+        for _ in range(wp.static(dim - 1)):
+            opening *= wp.length(defect[a]) / reference.V[a]
+        if opening > real(most):
+            if wp.length(surface[a] + defect[a]) > wp.length(surface[a]):
+                lower_to(torn, a)
+            surface[a] = surface[a] + defect[a]
+            defect[a] = vec()
+
+    return renew
 
 
 @functools.cache
@@ -131,8 +165,6 @@ def _make_correct(space: Space, simd: bool) -> wp.Kernel:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
-    finds_faces = True
-
     def __init__(self, option: Balance, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
         super().__init__(space, device)
         self.option, self.particles, n = option, particles, len(particles.mass)
@@ -148,7 +180,7 @@ class BalancedPairs(UpwindForces):
         reference, near, simd = configuration.fields, configuration.near, configuration.simd
         n, K = len(self.psi), configuration.K
         configuration.defect(state.surface, self.defect)
-        self._launch(make_renew(self.space), n, [reference, self.defect, state.surface, self.torn])
+        self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface, self.torn])
         for sweep in range(self.option.sweeps):
             old, new = self.psi, self._other
             if (self.option.sweeps - sweep) % 2:  # the last sweep writes ψ, the others take turns

@@ -15,10 +15,10 @@ from .base import Scheme
 from .breaking import Breaking
 from .dissipation import UpwindForces
 from .dual_forces import DualForces
+from .exposure import Exposure
 from .flux import Flux
 from .heating import Heating
 from .limiter import MassDiffusion
-from .opening import make_face
 from .pair_potentials import PairPotentials
 from .policy import ReferencePolicy
 from .reference import Configuration
@@ -63,7 +63,7 @@ def is_corrected(options: Scheme, policy: ReferencePolicy, surface_given: bool) 
 def _check_bonds(groups: Sequence[int], per_body: bool, who: str) -> None:
     """Raise ValueError where bodies are bonded and something closes its sums body by body."""
     if per_body and len(set(groups)) < len(groups):
-        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance(), and no shifting")
+        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance()")
 
 
 def _held(conditions: Sequence[Bound], span: range) -> np.ndarray:
@@ -188,12 +188,15 @@ class Medium:
         self.configuration.refresh(self.of(state))
 
     def find_surface(self, state: StateArrays) -> None:
-        """s_a at the start (M10): e_a, and where balanced (M13) the faces of particles at free surfaces by it."""
+        """s_a = e_a at the start (M10), where the arrangement moves zero for all that are beside no free surface."""
         nothing_yet, surface = self.forces.free_v, self.of(state).surface
         unit = None if self.sharpener is None else self.sharpener.unit()
         self.configuration.defect(nothing_yet, surface, unit)
-        if self.stabiliser.finds_faces:
-            self._launch(make_face(self.space), self.n, [self.configuration.fields, surface])
+        if not self.policy.fixed:
+            everyone = wp.full(self.n, 1, dtype=wp.int32, device=self.device)
+            exposure = Exposure(self.space, self.particles, everyone, False, self.device)
+            exposure.find(self.configuration.fields, self.configuration.near, surface, nothing_yet)
+            exposure.clear(surface)
 
     def look_outward(self, state: StateArrays) -> None:
         """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""

@@ -8,14 +8,14 @@ import numpy as np
 import warp as wp
 
 from ..execution import Launcher
-from ..fields import clock_structure, neighbour_structure, structure
+from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
 from ..structs import ClockArrays, ParticleArrays, StateArrays
+from .exposure import Exposure
 from .flux import Flux
 from .health import WELL
 from .laws import Part
-from .opening import is_exposed
 from .projection import Projection, pad
 from .reference import Configuration
 
@@ -79,7 +79,7 @@ def _make_shift(space: Space) -> wp.Kernel:
         clock: Clock,
         psi: wp.array(dtype=vec),
         free: wp.array(dtype=wp.int32),
-        stays: wp.array(dtype=wp.int32),
+        beside: wp.array(dtype=wp.int32),
         grad_v: wp.array(dtype=mat),
         grad_F: wp.array(dtype=rows),
         rate: real,
@@ -96,7 +96,7 @@ def _make_shift(space: Space) -> wp.Kernel:
         if length > most:
             delta = delta * (most / length)
         running = clock.bad[0] == WELL and clock.t[0] < clock.target[0]
-        if not running or free[a] == 0 or stays[a] != 0:
+        if not running or free[a] == 0 or beside[a] != 0:
             delta = vec()
         out[a] = delta
         mass = particles.mass[a]
@@ -112,53 +112,6 @@ def _make_shift(space: Space) -> wp.Kernel:
         state.x[a] = state.x[a] + moved
 
     return shift
-
-
-@functools.cache
-def _make_expose(space: Space) -> wp.Kernel:
-    """Kernel: which particles are at a free surface, by e_a = ``defect`` + s_a; those that are held are at none."""
-    vec, exposed_by = space.vec, is_exposed(space)
-    Reference, State = structure(space, "Reference"), structure(space, "State")
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def expose(
-        first: int,
-        reference: Reference,
-        state: State,
-        defect: wp.array(dtype=vec),
-        free: wp.array(dtype=wp.int32),
-        exposed: wp.array(dtype=wp.int32),
-    ):
-        a = first + wp.tid()
-        exposed[a] = 0
-        if free[a] != 0 and exposed_by(defect[a] + state.surface[a], reference.V[a]):
-            exposed[a] = 1
-
-    return expose
-
-
-@functools.cache
-def _make_stay(space: Space) -> wp.Kernel:
-    """Kernel: which particles are not shifted: at a free surface, beside another body, or neighbours of those."""
-    Particles, Neighbours = structure(space, "Particles"), neighbour_structure(space)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def stay(
-        first: int,
-        particles: Particles,
-        near: Neighbours,
-        exposed: wp.array(dtype=wp.int32),
-        stays: wp.array(dtype=wp.int32),
-    ):
-        a = first + wp.tid()
-        found = exposed[a]
-        for k in range(near.start[a], near.start[a + 1]):
-            b = near.index[k]
-            if exposed[b] != 0 or particles.body[b] != particles.body[a]:
-                found = 1
-        stays[a] = found
-
-    return stay
 
 
 @functools.cache
@@ -234,20 +187,17 @@ class Shifter:
         free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
-        self.exposed, self.stays = (wp.zeros(n, dtype=wp.int32, device=device) for _ in range(2))
+        self.exposure = Exposure(space, particles, self.free, True, device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
         self.projection = Projection(space, particles, flux.bodies, device)
 
     def evolving(self) -> dict[str, wp.array]:
         """Which particles may be shifted: for good, and before the next refresh."""
-        return {"Shifter.free": self.free, "Shifter.stays": self.stays}
+        return {"Shifter.free": self.free, "Shifter.beside": self.exposure.beside}
 
     def look(self, configuration: Configuration, defect: wp.array, U: StateArrays) -> None:
         """Who stays until the next refresh, by the ``defect`` e_a − s_a [m^(d−1)] of this one."""
-        arguments = [configuration.fields, U, defect, self.free, self.exposed]
-        self._launch(_make_expose(self.space), len(defect), arguments)
-        arguments = [self.particles, configuration.near, self.exposed, self.stays]
-        self._launch(_make_stay(self.space), len(defect), arguments)
+        self.exposure.find(configuration.fields, configuration.near, U.surface, defect)
 
     def apply(
         self,
@@ -266,7 +216,7 @@ class Shifter:
             clock,
             psi,
             self.free,
-            self.stays,
+            self.exposure.beside,
             grad_v,
             grad_F,
             option.rate,

@@ -51,8 +51,6 @@ class Stabiliser(ABC):
 
     #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
     corrects: ClassVar[bool] = True
-    #: Whether area vectors that bodies did not come with are the faces of particles at free surfaces, else e_a.
-    finds_faces: ClassVar[bool] = False
     #: Potentials [m], (n,) of vec, of corrections that have them, and the defect e_a − s_a [m^(d−1)] that they are of.
     psi: wp.array
     defect: wp.array
