@@ -64,6 +64,7 @@ from .scheme.surface_vectors import SurfaceVectors
 from .scheme.tie import Tie
 from .scheme.tilt import Tilt
 from .scheme.time_step import TimeStep
+from .scheme.uncorrected import Uncorrected
 from .scheme.verlet import Verlet
 from .settling import settle
 from .simulation import Body, Simulation
@@ -133,6 +134,7 @@ __all__ = [
     "Tilt",
     "TimeStep",
     "Traction",
+    "Uncorrected",
     "UnstableError",
     "Upwind",
     "Velocity",

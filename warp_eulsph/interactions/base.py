@@ -77,6 +77,10 @@ class BoundInteraction(ABC):
         """Energy [J] that it holds at ``world.U``, kinetic energy of its own included; reads the device."""
         return 0.0
 
+    def passed(self) -> float:
+        """Energy [J] that it put into what bodies store since the start, beside its work; reads the device."""
+        return 0.0
+
     def supplied(self) -> float:
         """Energy [J] put in from outside since the start, by a drive or weight of its own; reads the device.
 

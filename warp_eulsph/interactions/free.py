@@ -9,7 +9,7 @@ import warp as wp
 from ..boundaries import Assembly
 from ..checks import positive, real_array, real_number, short
 from ..structs import ClockArrays
-from .rigid_motion import BoundRigidMotion, Pose, RigidMotion, Wrench, spatial, turning
+from .rigid_motion import BoundRigidMotion, Pose, RigidMotion, Wrench, make_pose, spatial, turning
 from .shapes import Solid
 
 
@@ -78,6 +78,24 @@ def _kick(
     pose.L[0] = L_new
 
 
+@wp.kernel(module="unique", enable_backward=False)
+def _foresee(
+    wrench: wp.array(dtype=Wrench),
+    own: Wrench,
+    inverse_mass: wp.float64,
+    inverse: wp.vec3d,
+    dt: wp.array(dtype=wp.float64),
+    fraction: wp.float64,
+    pose: Pose,
+    out: Pose,
+):
+    w, tau = wrench[0] + own, fraction * dt[0]
+    out.x[0] = pose.x[0]
+    out.R[0] = pose.R[0]
+    out.v[0] = pose.v[0] + tau * inverse_mass * wp.vec3d(w[0], w[1], w[2])
+    out.spin[0] = spin_of(pose.R[0], pose.L[0] + tau * wp.vec3d(w[3], w[4], w[5]), inverse)
+
+
 class BoundFree(BoundRigidMotion):
     """A free body at work; the same steps as Störmer and Verlet's (M14), whatever the scheme."""
 
@@ -86,10 +104,16 @@ class BoundFree(BoundRigidMotion):
         count = {1: 0, 2: 1, 3: 3}[assembly.space.dim]
         inverse = np.zeros(3)
         inverse[3 - count :] = 1.0 / inertia[3 - count :]
+        self._foreseen = make_pose(np.zeros(3), np.eye(3), assembly.device)
         self.inverse_mass, self.inverse_inertia, self._own = 1.0 / mass, wp.vec3d(*inverse), Wrench(*own)
 
     def look(self, clock: ClockArrays, fraction: float) -> None:
         self._drift(clock, fraction, self.at)
+
+    def ahead(self, clock: ClockArrays, fraction: float, wrench: wp.array) -> Pose:
+        numbers = [self._own, self.inverse_mass, self.inverse_inertia, clock.dt, fraction]
+        self._launch.once(_foresee, 1, [wrench, *numbers, self.pose, self._foreseen])
+        return self._foreseen
 
     def advance(self, clock: ClockArrays, wrench: wp.array) -> None:
         self._drift(clock, 0.5, self.pose)

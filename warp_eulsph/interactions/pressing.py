@@ -34,12 +34,12 @@ def trace_structure(space: Space) -> Any:
 
 
 @functools.cache
-def _read_row(space: Space) -> wp.Function:
+def read_row(space: Space) -> wp.Function:
     """``wp.func``: Σ ω f over the row of a point, in three components."""
     vec, dim, TracePoints = space.vec, space.dim, trace_structure(space)
 
     @wp.func
-    def read_row(points: TracePoints, k: int, f: wp.array(dtype=vec)) -> wp.vec3d:
+    def read_row_of(points: TracePoints, k: int, f: wp.array(dtype=vec)) -> wp.vec3d:
         y = wp.vec3d()
         for i in range(points.start[k], points.start[k + 1]):
             value, weight = f[points.places[i]], wp.float64(points.weights[i])
@@ -47,11 +47,11 @@ def _read_row(space: Space) -> wp.Function:
                 y[j] = y[j] + weight * wp.float64(value[j])
         return y
 
-    return read_row
+    return read_row_of
 
 
 @functools.cache
-def _gap(distance: Any) -> wp.Function:
+def signed_gap(distance: Any) -> wp.Function:
     """``wp.func``: unit normal out of the rigid body, and the distance [m] of a place from it."""
 
     @wp.func
@@ -66,7 +66,7 @@ def _gap(distance: Any) -> wp.Function:
 
 @functools.cache
 def make_measure(space: Space, distance: Any) -> wp.Kernel:
-    vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
+    vec, gap, read, TracePoints = space.vec, signed_gap(distance), read_row(space), trace_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def measure(
@@ -101,7 +101,7 @@ def rubbed(y: wp.vec3d, anchor: wp.vec3d, n: wp.vec3d, stiffness: wp.float64, mo
 @functools.cache
 def make_press(space: Space, distance: Any, rubs: bool) -> wp.Kernel:
     """Kernel: the force of the rigid body on each point, what it does to the rigid body, and the energy it holds."""
-    vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
+    vec, gap, read, TracePoints = space.vec, signed_gap(distance), read_row(space), trace_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def press(
@@ -143,7 +143,7 @@ def make_press(space: Space, distance: Any, rubs: bool) -> wp.Kernel:
 @functools.cache
 def make_tie(space: Space, distance: Any) -> wp.Kernel:
     """Kernel: where each point is tied to the rigid body, in its frame: after a step where it is, less elastic slip."""
-    vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
+    vec, gap, read, TracePoints = space.vec, signed_gap(distance), read_row(space), trace_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def tie(
@@ -205,7 +205,7 @@ def make_ask(space: Space, distance: Any) -> wp.Kernel:
     The largest k Σ ω²/m of a point, and k (1/M + r²/I) of each, which add up to a bound for the rigid body; with
     friction r² counts twice, for the force across.
     """
-    vec, gap, read, TracePoints = space.vec, _gap(distance), _read_row(space), trace_structure(space)
+    vec, gap, read, TracePoints = space.vec, signed_gap(distance), read_row(space), trace_structure(space)
     Clock, raise_largest = clock_structure(space), raise_to(wp.float64)
 
     @wp.kernel(module="unique", enable_backward=False)

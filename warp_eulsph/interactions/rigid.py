@@ -18,6 +18,7 @@ from .pressing import make_ask, make_gather, make_measure, make_press, make_rais
 from .rigid_motion import Held, RigidMotion, Wrench, make_pose, rotation_matrix, spatial, turning
 from .shapes import Numbers, Shape
 from .traces import Traces, find_traces
+from .wetting import Wetting
 
 if TYPE_CHECKING:
     from ..scheme.world import World
@@ -98,7 +99,7 @@ class BoundRigidBody(BoundInteraction):
         self.recordable = self.motion.recordable
         self._launch = Launcher(device)
         numbers = [*self._solid.numbers, *[0.0] * 6][:6]
-        self._shape = [-1.0 if option.hollow else 1.0, Numbers(*numbers), self._solid.triangles]
+        self.shape = [-1.0 if option.hollow else 1.0, Numbers(*numbers), self._solid.triangles]
         self._rubs = option.friction > 0.0
         inertia = float(max(self.motion.inverse_inertia)) * (2.0 if self._rubs else 1.0)
         self._inverse = wp.vec2d(self.motion.inverse_mass, inertia)
@@ -106,7 +107,8 @@ class BoundRigidBody(BoundInteraction):
             wp.zeros(1, dtype=Wrench, device=device),
             wp.zeros(1, dtype=wp.float64, device=device),
         )
-        self._sum = wp.zeros(1, dtype=wp.float64, device=device)
+        self._sum, self._passed = (wp.zeros(1, dtype=wp.float64, device=device) for _ in range(2))
+        self._wetted: list[Wetting] = []
 
     def start(self, world: "World") -> None:
         order, who = self.assembly.order, f"rigid body {self.option.name!r}"
@@ -120,9 +122,12 @@ class BoundRigidBody(BoundInteraction):
             order.by_number(a.numpy()).astype(float) for a in (world.particles.mass, world.particles.spacing)
         )
         stiffness, shear = traces.areas * moduli[body[traces.tops]].T / spacing[traces.tops]
+        wet = _wet_points(world, traces.tops)
+        for _, own in wet:  # they feel its matter, not its face
+            stiffness[own] = shear[own] = 0.0
         m, row = len(traces.tops), np.repeat(np.arange(len(traces.tops)), np.diff(traces.start))
         inertia = np.bincount(row, traces.weights**2 / mass[traces.members], minlength=m)
-        self._points = self._fill(traces, stiffness, shear, inertia)
+        self.points = self._fill(traces, stiffness, shear, inertia)
         self._by_particle(traces, row)
         device = self.device
         self._push, self._wrenches = (
@@ -131,10 +136,13 @@ class BoundRigidBody(BoundInteraction):
         )
         self._energies, self._frequencies = (wp.zeros(m, dtype=wp.float64, device=device) for _ in range(2))
         self._add_wrenches, self._add = Sum(Wrench, m, device), Sum(wp.float64, m, device)
-        gaps = self._gaps(world, self._points, m)
-        self._points.half.assign(traces.half + np.minimum(gaps, 0.0))
+        gaps = self._gaps(world, self.points, m)
+        self.points.half.assign(traces.half + np.minimum(gaps, 0.0))
         self._anchors = wp.zeros(m if self._rubs else 0, dtype=wp.vec3d, device=device)
         self._tie(world)
+        for medium, own in wet:
+            self._wetted.append(Wetting(self, own, medium, world))
+            medium.walls.take(self._wetted[-1])
 
     def _fill(self, traces: Traces, stiffness: np.ndarray, shear: np.ndarray, inertia: np.ndarray) -> Any:
         points, device = trace_structure(self.space)(), self.device
@@ -160,7 +168,7 @@ class BoundRigidBody(BoundInteraction):
         self.motion.look(world.clock.fields, 0.0)
         out = wp.zeros(m, dtype=wp.float64, device=self.device)
         kernel = make_measure(self.space, self.option.shape.distance)
-        self._launch(kernel, m, [points, world.U.x, self.motion.at, *self._shape, out])
+        self._launch(kernel, m, [points, world.U.x, self.motion.at, *self.shape, out])
         gaps: np.ndarray = out.numpy()
         return gaps
 
@@ -180,35 +188,44 @@ class BoundRigidBody(BoundInteraction):
             )
 
     def _press(self, state: StateArrays) -> None:
-        arguments = [self._points, state.x, self.motion.at, *self._shape, float(self.option.friction), self._anchors]
+        arguments = [self.points, state.x, self.motion.at, *self.shape, float(self.option.friction), self._anchors]
         kernel = make_press(self.space, self.option.shape.distance, self._rubs)
         self._launch(kernel, len(self._push), [*arguments, self._push, self._wrenches, self._energies])
 
     def _tie(self, world: "World") -> None:
         """What friction remembers, at the end of a step."""
         if self._rubs:
-            arguments = [self._points, world.U.x, self.motion.pose, *self._shape, float(self.option.friction)]
+            arguments = [self.points, world.U.x, self.motion.pose, *self.shape, float(self.option.friction)]
             kernel = make_tie(self.space, self.option.shape.distance)
             self._launch(kernel, len(self._push), [*arguments, self._anchors])
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
         self.motion.look(world.clock.fields, fraction)
         self._press(state)
+        for wetting in self._wetted:
+            wetting.press(self._push, self._wrenches)
         self._add_wrenches(self._wrenches, self._wrench)
+        for wetting in self._wetted:
+            wetting.look_ahead(self._wrench)
         self._launch(make_gather(self.space), len(self._members), [self._members, *self._gathered, self._push, out])
 
     def rate(self, world: "World") -> None:
         clock, U = world.clock.fields, world.U
         self.motion.look(clock, 0.0)
-        arguments = [self._points, U.x, U.v, self.motion.at, *self._shape, self._inverse, clock, self._asked]
+        arguments = [self.points, U.x, U.v, self.motion.at, *self.shape, self._inverse, clock, self._asked]
         kernel = make_ask(self.space, self.option.shape.distance)
         self._launch(kernel, len(self._push), [*arguments, self._frequencies])
         self._add(self._frequencies, self._sum)
         self._launch.once(make_raise(self.space), 1, [self._asked, self._sum, clock])
 
     def advance(self, world: "World") -> None:
+        for wetting in self._wetted:
+            wetting.account(self._push, self._wrench, self._passed)
         self.motion.advance(world.clock.fields, self._wrench)
         self._tie(world)
+
+    def passed(self) -> float:
+        return float(self._passed.numpy()[0])
 
     def energy(self, world: "World") -> float:
         self.motion.look(world.clock.fields, 0.0)
@@ -220,7 +237,8 @@ class BoundRigidBody(BoundInteraction):
         return float(self.motion.work.numpy()[0])
 
     def evolving(self) -> dict[str, wp.array]:
-        own = {"wrench": self._wrench, "anchors": self._anchors} if self._rubs else {"wrench": self._wrench}
+        own = {"wrench": self._wrench, "passed": self._passed} | ({"anchors": self._anchors} if self._rubs else {})
+        own |= {f"met.{k}": wetting.met for k, wetting in enumerate(self._wetted)}
         return {**self.motion.evolving(), **own}
 
     def _row(self, array: wp.array, components: slice) -> np.ndarray:
@@ -262,3 +280,13 @@ class BoundRigidBody(BoundInteraction):
         """Moment of the bodies on it about its centre of mass in the last step [N m], as ``spin``."""
         axial = AXIAL[self.space.dim]
         return self._row(self._wrench, slice(3 + axial.start, 3 + axial.stop))
+
+
+def _wet_points(world: "World", tops: np.ndarray) -> list[tuple[Any, np.ndarray]]:
+    """Media in whose sums walls take part (M28), and the points that are particles of each, (k,)."""
+    found = []
+    for medium in world.media:
+        own = np.flatnonzero((tops >= medium.span.start) & (tops < medium.span.stop))
+        if medium.stabiliser.takes_walls and len(own):
+            found.append((medium, own))
+    return found

@@ -129,6 +129,10 @@ class BoundRigidMotion:
     def advance(self, clock: ClockArrays, wrench: wp.array) -> None:
         """Pose ``pose`` at the end of the step, in which bodies pushed by ``wrench``."""
 
+    def ahead(self, clock: ClockArrays, fraction: float, wrench: wp.array) -> Pose:
+        """The pose, with the velocities that it has ``fraction`` · Δt later by the forces of bodies on it."""
+        return self.pose
+
     def kinetic(self) -> float:
         """Kinetic energy [J]; reads the device."""
         return 0.0

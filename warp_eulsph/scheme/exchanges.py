@@ -59,11 +59,13 @@ def _make_book_work(entry_type: Any, external: int) -> wp.Kernel:
 class Exchange(NamedTuple):
     """An interaction as the ledger sees it.
 
-    Its forces [N] on particles, (n,) of vec, the energy [J] it holds, and what came in through it from outside.
+    Its forces [N] on particles, (n,) of vec, the energy [J] it holds, what it put into stores of bodies beside their
+    work, and what came in through it from outside.
     """
 
     forces: wp.array
     energy: Callable[[], float]
+    passed: Callable[[], float]
     supplied: Callable[[], float]
 
 
@@ -111,7 +113,8 @@ class Exchanges:
         """
         booked = zip(self._exchanges, self._works.numpy().tolist(), self._start.numpy().tolist(), strict=True)
         return [
-            work + float(exchange.energy()) - start - float(exchange.supplied()) for exchange, work, start in booked
+            work + float(exchange.passed()) + float(exchange.energy()) - start - float(exchange.supplied())
+            for exchange, work, start in booked
         ]
 
     def supplied(self) -> float:

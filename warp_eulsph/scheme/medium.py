@@ -28,6 +28,7 @@ from .shifting import Shifter
 from .stabiliser import Stabiliser, Sums
 from .updates import make_drift, make_kick, make_mean, make_predict
 from .volume_flux import VolumeFlux
+from .walls import Walls
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,7 @@ class Medium:
     Attributes:
         surface_given: the bodies came with their area vectors.
         stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
+        walls: what takes part in its sums from outside.
         breaking, heating, volumes: None where no law fails, none takes heat, no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
@@ -124,6 +126,7 @@ class Medium:
         users = [option for option in (options.dissipation, options.limiter) if option is not None]
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
+        self.walls = Walls()
         self.heating: Heating | None = None
         self.volumes: VolumeFlux | None = None
         self.smoothed_F_k = self.configuration.fields.F
@@ -147,7 +150,7 @@ class Medium:
         upwind, flux = self.options.dissipation, self.flux.fields
         epsilon = 0.0 if upwind is None else upwind.epsilon
         d = None if upwind is None or upwind.sensor is None else self.sensors[upwind.sensor].d
-        self.sums = Sums(self.configuration, flux, self.grad_v, self.forces, epsilon, d)
+        self.sums = Sums(self.configuration, flux, self.stabiliser.exact(self.grad_v), self.forces, epsilon, d)
 
     def keep_gradients(self, on: bool) -> None:
         """Whether each step leaves ∇_k v^{n+1} for the next one."""
@@ -221,6 +224,7 @@ class Medium:
         self.stabiliser.refresh(self.configuration, U)
         if self.shifter is not None:
             self.shifter.look(self.configuration, self.stabiliser.defect, U)
+        self.walls.renew()
         self._derive()
 
     def rebuild(self) -> None:
@@ -251,7 +255,9 @@ class Medium:
     def velocity_gradient(self, state: StateArrays, out: wp.array | None = None) -> None:
         """∇_k v (M4, M23), into ``grad_v`` by default."""
         gradient = self.configuration.gradient if self.sharpener is None else self.sharpener.gradient
-        gradient(self.of(state).v, self.grad_v if out is None else out)
+        found, v = self.grad_v if out is None else out, self.of(state).v
+        gradient(v, found)
+        self.walls.add_gradient(v, found)
 
     def keep_gradient(self, state: StateArrays) -> None:
         """∇_k v of a state in which a step begins, where it is kept."""
@@ -302,8 +308,9 @@ class Medium:
     def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
         at, v = self.of(state), self.of(rates).v
+        grad_v = self.stabiliser.exact(self.walls.without(v, self.grad_v, self.sums.grad_v))
         if self.heating is not None:
-            self.heating.note(at.x, v, self.grad_v)
+            self.heating.note(at.x, v, grad_v)
         if self.pairs is not None:
             self.pairs.compute(self.sums, at, v)
         self.stabiliser.compute(self.sums, at.x, v)
@@ -355,7 +362,7 @@ class Medium:
     def find_exchange(self) -> None:
         """What volume flows between pairs (M24)."""
         if self.volumes is not None:
-            self.volumes.find(self.sums, self.clock)
+            self.volumes.find(self.sums, self.stabiliser.exact, self.clock)
 
     def exchange(self, state: StateArrays) -> None:
         """That volume into J."""

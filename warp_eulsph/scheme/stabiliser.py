@@ -32,7 +32,7 @@ class Sums:
     Attributes:
         configuration: its reference k.
         flux: stress and impedances.
-        grad_v: ∇_k v [1/s] (M4), (n,) of mat.
+        grad_v: ∇_k v [1/s] (M4) by which M9 reconstructs, (n,) of mat.
         forces: written.
         epsilon: share of the upwind flux (M9), 0 where nothing dissipates.
         sensor: (n,) of vec in [0, 1] that switches M9 to first order; None without.
@@ -51,9 +51,13 @@ class Stabiliser(ABC):
 
     #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
     corrects: ClassVar[bool] = True
+    #: Whether walls take part in the sums (M28).
+    takes_walls: ClassVar[bool] = False
     #: Potentials [m], (n,) of vec, of corrections that have them, and the defect e_a − s_a [m^(d−1)] that they are of.
     psi: wp.array
     defect: wp.array
+    #: κ of each particle, (n,), where walls take part (M27).
+    kappa: wp.array
 
     @abstractmethod
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
@@ -62,6 +66,10 @@ class Stabiliser(ABC):
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
         """Whether ``compute``, with a sensor or without, takes Π from the array of the flux (M5)."""
         return True
+
+    def exact(self, gradient: wp.array) -> wp.array:
+        """Gradients that are exact for linear fields from those of the reference, by which M9 and M24 reconstruct."""
+        return gradient
 
     def evolving(self) -> dict[str, wp.array]:
         """Arrays by name that live from step to step: what a checkpoint must hold."""

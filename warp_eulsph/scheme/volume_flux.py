@@ -1,6 +1,7 @@
 """The other half of the acoustic flux: volume that flows from where pressure is high to where it is low (M24)."""
 
 import functools
+from collections.abc import Callable
 
 import warp as wp
 
@@ -114,12 +115,13 @@ class VolumeFlux:
         self._p = wp.zeros(n, dtype=space.row(1), device=device)
         self._grad_p = wp.zeros(n, dtype=space.row_gradient(1), device=device)
 
-    def find(self, sums: Sums, clock: ClockArrays) -> None:
+    def find(self, sums: Sums, exact: Callable[[wp.array], wp.array], clock: ClockArrays) -> None:
         """ΔV/V of the step, by the pressures that it was made with."""
         configuration, n = sums.configuration, len(self.change)
         self._launch(_make_pressure(self.space), n, [sums.flux, self._p])
         configuration.gradient(self._p, self._grad_p)
-        arguments = [configuration.fields, configuration.near, sums.flux, self._p, self._grad_p, sums.epsilon]
+        gradient = exact(self._grad_p)
+        arguments = [configuration.fields, configuration.near, sums.flux, self._p, gradient, sums.epsilon]
         self._launch(_make_exchange(self.space), n, [*arguments, clock, self.change])
 
     def take(self, F: wp.array) -> None:

@@ -159,7 +159,7 @@ class World:
             return None
         between = zip(self.interactions, self.exchanged, strict=True)
         listed = [
-            Exchange(forces, functools.partial(interaction.energy, self), interaction.supplied)
+            Exchange(forces, functools.partial(interaction.energy, self), interaction.passed, interaction.supplied)
             for interaction, forces in between
         ]
         return Exchanges(self.space, self.particles, self.clock.fields, listed, self.device)

@@ -1,0 +1,128 @@
+"""Sums without corrections, by which the pressure of a liquid is one with where its particles are (M27)."""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ..linalg import inverse
+from ..space import Space
+from ..structs import ParticleArrays, StateArrays
+from ..weights import Weight
+from .dissipation import UpwindForces
+from .flux import Flux
+from .reference import Configuration
+from .stabiliser import Correction
+
+# Spacings from which a weight is summed over a lattice.
+FAR = 8
+
+
+@dataclass(frozen=True)
+class Uncorrected(Correction):
+    """Gradients and forces of liquids without L: M4 and M5 with κ 1 in its place, κ that of a lattice (M27).
+
+    Then J follows the arrangement: particles that crowd anywhere are compressed, and pressure drives them apart. By M4
+    with L, and more so by balanced pair vectors (M13), what is not seen is not resisted: a liquid under its weight
+    crowds, sinks and stirs itself up. Rigid walls are felt by what their matter would be in the sums. Dissipation (M9)
+    and the flow of volume (M24) reconstruct by exact gradients all the same.
+
+    Raises:
+        ValueError: when the simulation is built: a body that flows and carries more than J.
+    """
+
+    def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "UncorrectedForces":
+        """Allocate for the bodies of ``flux``."""
+        if not flux.forgets:
+            raise ValueError(
+                "correction=Uncorrected() is for liquids and gases, whose F is J^(1/d) I, got a solid whose "
+                "arrangement is read anew; take Balance() there, or arrangement=Convected()"
+            )
+        return UncorrectedForces(space, len(particles.mass), device)
+
+
+@functools.cache
+def lattice_sum(weight: Weight, dim: int, h: float) -> float:
+    """Σ_b V_b g_ab ξ_x² on a lattice of spacing 1, for smoothing length ``h``: M3, about 1."""
+    axis = np.arange(-FAR, FAR + 1.0)
+    xi = np.stack(np.meshgrid(*[axis] * dim, indexing="ij"), -1).reshape(-1, dim)
+    q = np.linalg.norm(xi, axis=1) / h
+    slope = weight.profile(wp.float64)[1]
+    g = np.array([float(slope(wp.float64(each))) if 0.0 < each < weight.support else 0.0 for each in q])
+    return float((g * xi[:, 0] ** 2).sum() * weight.sigma[dim - 1] / h ** (dim + 2))
+
+
+@functools.cache
+def _make_replace(space: Space) -> wp.Kernel:
+    """Kernel: L ← κ 1, keeping what it was."""
+    mat, real, dim = space.mat, space.real, space.dim
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def replace(first: int, kappa: wp.array(dtype=real), L: wp.array(dtype=mat), of_pairs: wp.array(dtype=mat)):
+        a = first + wp.tid()
+        of_pairs[a] = L[a]
+        L[a] = wp.identity(n=wp.static(dim), dtype=real) * kappa[a]
+
+    return replace
+
+
+@functools.cache
+def _make_mend(space: Space, components: int) -> wp.Kernel:
+    """Kernel: exact gradients of rows of ``components`` reals: by the L of M3 instead of what is in its place."""
+    mat, gradient, invert = space.mat, space.row_gradient(components), inverse(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def mend(
+        first: int,
+        found: wp.array(dtype=gradient),
+        L: wp.array(dtype=mat),
+        of_pairs: wp.array(dtype=mat),
+        out: wp.array(dtype=gradient),
+    ):
+        a = first + wp.tid()
+        out[a] = found[a] @ (invert(L[a]) @ of_pairs[a])
+
+    return mend
+
+
+class UncorrectedForces(UpwindForces):
+    """M9 and M27 at work: it takes L out of the reference.
+
+    Attributes:
+        kappa: κ of each particle, (n,); from the first refresh on.
+    """
+
+    takes_walls = True
+
+    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
+        super().__init__(space, device)
+        self._of_pairs, self._exact = (wp.zeros(n, dtype=space.mat, device=device) for _ in range(2))
+        self.kappa = wp.zeros(n, dtype=space.real, device=device)
+        self._L: wp.array | None = None
+
+    def _weigh(self, configuration: Configuration) -> None:
+        particles, dim = configuration.particles, self.space.dim
+        ratio = particles.h.numpy().astype(float) / particles.spacing.numpy()
+        known, which = np.unique(ratio.round(6), return_inverse=True)
+        found = np.array([1.0 / lattice_sum(configuration.weight, dim, float(each)) for each in known])
+        self.kappa.assign(found[which])
+        self._L = configuration.fields.L
+
+    def refresh(self, configuration: Configuration, state: StateArrays) -> None:
+        """Take L out of the new reference."""
+        if self._L is None:
+            self._weigh(configuration)
+        self._launch(_make_replace(self.space), len(self.kappa), [self.kappa, self._L, self._of_pairs])
+
+    def evolving(self) -> dict[str, wp.array]:
+        """What L was, and κ, which goes with the particles."""
+        return {"Uncorrected.of_pairs": self._of_pairs, "Uncorrected.kappa": self.kappa}
+
+    def exact(self, gradient: wp.array) -> wp.array:
+        """Exact gradients from those of the reference; of velocities in an array of its own, of others in place."""
+        out = self._exact if gradient.dtype is self.space.mat else gradient
+        if self._L is not None:
+            kernel = _make_mend(self.space, wp.types.type_size(gradient.dtype) // self.space.dim)
+            self._launch(kernel, len(out), [gradient, self._L, self._of_pairs, out])
+        return out
