@@ -223,7 +223,7 @@ class Medium:
         U = self.of(state)
         self.stabiliser.refresh(self.configuration, U)
         if self.shifter is not None:
-            self.shifter.look(self.configuration, self.stabiliser.defect, U)
+            self.shifter.look(self.configuration, self.stabiliser.potentials.defect, U)
         self.walls.renew()
         self._derive()
 
@@ -244,10 +244,9 @@ class Medium:
     def shift(self, state: StateArrays) -> None:
         """Shift the particles (M15), where the options say so."""
         if self.shifter is not None:
-            U = self.of(state)
+            U, psi = self.of(state), self.stabiliser.potentials.psi
             self.velocity_gradient(state)
             self.configuration.gradient(self._rows(U.F), self.grad_F)
-            psi = self.stabiliser.psi
             self.shifter.apply(self.configuration, psi, U, self.grad_v, self.grad_F, self.clock)
 
     # the lines of a step
