@@ -31,7 +31,8 @@ def tank(n, scheme):
     x, volume = box((0.0, 0.0), (1.0, 1.0), 1.0 / n)
     water = es.Body(x=x, volume=volume, material=WATER, spacing=1.0 / n)
     conditions = [es.BodyForce(filling_up), es.Damping(30.0)]
-    return es.Simulation(water, boundaries=conditions, interactions=walls(), scheme=scheme)
+    options = {"scheme": scheme, "weight": es.CubicSpline(), "dilation": 1.3} if scheme else {}
+    return es.Simulation(water, boundaries=conditions, interactions=walls(), **options)
 
 
 def test_liquid_rests_in_a_tank():

@@ -1,4 +1,4 @@
-"""The scheme and the weight of bodies that were given none: by whether their matter deforms or flows."""
+"""The scheme and the weight of bodies that were given none: solids and gases, or liquids."""
 
 from typing import NamedTuple
 
@@ -19,13 +19,14 @@ class Suited(NamedTuple):
     dilation: float
 
 
-#: Matter that carries its F: neighbours stay neighbours, and gradients are exact for linear fields.
-DEFORMING = Suited(Verlet(), CubicSpline(), 1.3)
+#: Gradients are exact for linear fields.
+COMMON = Suited(Verlet(), CubicSpline(), 1.3)
 
-#: Liquids and gases, which carry J alone. Pressure follows the arrangement (M27) and is even (M24), the arrangement is
+#: Pressure follows the arrangement (M27) and is even (M24), the arrangement is
 #: kept so (M15), and particles do not pair up by this weight (Dehnen & Aly 2012). In smooth waves half of M9 is as much
-#: by it as the whole is by that of solids: its fourth moment is twice as large (``tests/test_defaults.py``).
-FLOWING = Suited(
+#: by it as the whole is by the common one: its fourth moment is twice as large (``tests/test_defaults.py``). Not for
+#: gases: their pressure at rest moves particles wherever the arrangement is uneven.
+LIQUID = Suited(
     Verlet(dissipation=Upwind(epsilon=0.5, volume=True), correction=Uncorrected(), shifting=Shifting()),
     WendlandC2(),
     1.8,
@@ -34,4 +35,4 @@ FLOWING = Suited(
 
 def suited(material: Material) -> Suited:
     """What suits this material."""
-    return FLOWING if material.forgets else DEFORMING
+    return LIQUID if material.liquid else COMMON
