@@ -1,5 +1,7 @@
 """Contact at work: restart, threads, searches, which bodies touch, and what is refused."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from touching import SOFT, bar, bits, mean_velocity, rectangle, rings
@@ -94,6 +96,50 @@ def test_it_searches_only_when_something_has_moved():
     assert 0 < nearby.searches < 15
 
 
+def test_bodies_that_fly_along_together_are_not_searched_for_again():
+    """Only relative motion counts: two rings at one speed, hundreds of spacings far."""
+    still = rings(0.0)
+    bodies = [dataclasses.replace(body, velocity=(40.0, 0.0)) for body in still.bodies]
+    simulation = es.Simulation(bodies, interactions=[es.Contact()])
+    simulation.run(1.0)
+    nearby = simulation.bound_interactions[0].nearby
+    assert simulation.x[:, 0].mean() > 40.0 and nearby.searches == 1
+
+
+@pytest.mark.parametrize("scheme", [es.Verlet(), es.LaxWendroff()], ids=["Verlet", "LaxWendroff"])
+@pytest.mark.parametrize("arrangement", [es.Convected(), es.Current()], ids=["fixed", "moving"])
+def test_rows_by_a_search_in_every_step_change_no_bit(scheme, arrangement):
+    found = []
+    for always in (False, True):
+        simulation = rings(0.15, scheme=scheme, arrangement=arrangement)
+        nearby = simulation.bound_interactions[0].nearby
+        for _ in range(110):
+            if always:
+                nearby.forget()
+            simulation.step()
+        found.append(bits(simulation))
+        assert nearby.searches > 110 if always else 1 < nearby.searches < 80
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("scheme", [es.Verlet(), es.LaxWendroff()], ids=["Verlet", "LaxWendroff"])
+@pytest.mark.parametrize("arrangement", [es.Convected(), es.Current()], ids=["fixed", "moving"])
+def test_recorded_steps_keep_every_bit(scheme, arrangement):
+    """A graph stops where the contact has to search, and the host takes that step."""
+    found = []
+    for on in (False, True):
+        execution.set_graphs(on)
+        bodies, contact = rings(0.15).bodies, es.Contact(friction=0.3)
+        simulation = es.Simulation(bodies, interactions=[contact], scheme=scheme, arrangement=arrangement)
+        assert simulation.by_graphs is on
+        simulation.step(60)
+        simulation.run(simulation.t * 2.0)
+        assert simulation.energy()["held"] > 0.0
+        found.append(bits(simulation))
+    assert simulation.bound_interactions[0].nearby.searches > 3
+    assert found[0] == found[1]
+
+
 def test_only_the_named_pairs_touch(caplog):
     """The third passes through, and somebody says so; the others are not told of."""
     bodies = [bar(20, 0.0, 1.0, 1.0, velocity=0.3, name="a"), bar(20, 1.1, 1.0, 1.0, name="b")]
@@ -116,8 +162,8 @@ def test_bad_set_ups_get_one_clear_error():
     inside = es.Body(x=rectangle(2, 2, h, (0.35, 0.35)), volume=h * h, material=SOFT, name="two")
     with pytest.raises(ValueError, match="must not lie in each other"):
         es.Simulation([one, inside], interactions=[es.Contact()])
-    with pytest.raises(ValueError, match="two bodies that are not bonded are needed"):
-        es.Simulation([one], interactions=[es.Contact()])
+    with pytest.raises(ValueError, match="two bodies that are not bonded, or one whose arrangement stays"):
+        es.Simulation([one], interactions=[es.Contact()], arrangement=es.Current())
     apart = es.Body(x=rectangle(8, 8, h, (0.0, 2.0)), volume=h * h, material=SOFT, name="two")
     with pytest.raises(ValueError, match=r"bodies must be among \['one', 'two'\], got 'tow'"):
         es.Simulation([one, apart], interactions=[es.Contact(between=[("one", "tow")])])

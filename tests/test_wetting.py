@@ -1,5 +1,7 @@
 """Liquids without corrections (M27) and rigid walls in their sums (M28): rest, exchange of energy, walls that move."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import warp as wp
@@ -147,3 +149,65 @@ def test_solids_that_are_read_anew_cannot_be_uncorrected():
     scheme = es.Verlet(correction=es.Uncorrected())
     with pytest.raises(ValueError, match=r"is for liquids and gases, .* got a solid whose arrangement is read anew"):
         es.Simulation(rubber, arrangement=es.Current(), scheme=scheme)
+
+
+def test_liquid_rests_on_an_elastic_solid():
+    """The same on rubber between two walls that touch the water alone; half as wide."""
+    n, density = 16, 1e3
+    x, volume = box((0.0, 0.0), (0.5, 1.0), 1.0 / n)
+    water = es.Body(x=x, volume=volume, material=WATER, spacing=1.0 / n, name="water")
+    x, volume = box((-0.25, -0.25), (0.75, 0.0), 1.0 / n)
+    rubber = es.NeoHookean(density=density, young=4e6, poisson=0.3)
+    bed = es.Body(x=x, volume=volume, material=rubber, spacing=1.0 / n, name="bed")
+    planes = [(1.0, 0.0), (-1.0, 0.0)]
+    sides = [
+        RigidBody(Plane(normal=n), centre=(0.25 - 0.25 * n[0], 0.0), bodies=["water"], name=f"side {n[0]}")
+        for n in planes
+    ]
+    held = es.Fixed(lambda X: X[:, 1] < -0.25 + 1.0 / n)
+    conditions = [es.BodyForce(filling_up, body="water"), es.Damping(30.0), held]
+    simulation = es.Simulation([water, bed], boundaries=conditions, interactions=[es.Contact(), *sides], scheme=SCHEME)
+    found, own = [], slice(0, len(water.x))
+    for t in (RAMP + 25.0 / SOUND, RAMP + 50.0 / SOUND):
+        simulation.run(t)
+        x = simulation.x[own]
+        depth = x[:, 1].max() + 0.5 / n - x[:, 1]
+        error = -simulation.cauchy_stress[own, 0, 0] / (1e3 * WEIGHT) - depth
+        assert np.sqrt(np.mean(error**2)) < 0.01
+        found.append(x[:, 1].mean())
+    assert abs(found[1] - found[0]) < 2e-4
+    pressed = simulation.interaction_force[len(water.x) :, 1].sum()
+    assert pressed == pytest.approx(-500.0 * WEIGHT, rel=5e-3)
+    energy = simulation.energy()
+    assert abs(energy["interaction"]) < 1e-10 and abs(energy["residual"]) < 1e-10 * energy["total"]
+
+
+@pytest.mark.parametrize(("dim", "real"), [(1, wp.float64), (2, wp.float64), (3, wp.float64), (2, wp.float32)])
+def test_liquid_hits_a_free_solid(dim, real):
+    """A blob hits a block: both momenta as they were, nothing made where they meet, nothing through it."""
+    n = {1: 16, 2: 8, 3: 5}[dim]
+    x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
+    velocity = np.zeros(dim)
+    velocity[0] = -3.0
+    water = dataclasses.replace(WATER, cavitation=0.0)
+    blob = es.Body(x=x, volume=volume, material=water, spacing=1.0 / n, velocity=velocity, name="blob")
+    shift = np.full(dim, 0.2 / n)
+    shift[0] = -3.0 / n
+    x, volume = box(tuple(shift), tuple(shift + np.array([3.0 / n, *[1.0] * (dim - 1)])), 1.0 / n)
+    rubber = es.NeoHookean(density=700.0, young=2e6, poisson=0.3)
+    block = es.Body(x=x, volume=volume, material=rubber, spacing=1.0 / n, name="block")
+    simulation = es.Simulation([blob, block], interactions=[es.Contact()], scheme=SCHEME, dtype=real)
+    mass = simulation.order.by_number(simulation.stepper.particles.mass.numpy()).astype(float)
+    start = mass @ simulation.v
+    simulation.run(0.15)
+    tolerance = 1e-12 if real is wp.float64 else 1e-5
+    np.testing.assert_allclose(mass @ simulation.v, start, atol=tolerance * np.abs(start).max())
+    energy = simulation.energy()
+    assert abs(energy["interaction"]) < max(tolerance, 1e-12) * energy["total"] * 10.0
+    assert abs(energy["residual"]) < 10.0 * tolerance * energy["total"]
+    speed = simulation.v[len(blob.x) :, 0].mean()
+    assert speed < -1.0 and simulation.x[: len(blob.x), 0].min() > simulation.x[len(blob.x) :, 0].max() - 0.75 / n
+    if dim == 2 and real is wp.float64:
+        x, v, own = simulation.x, simulation.v, slice(0, len(blob.x))
+        turned = mass[own] @ (-3.0 * -blob.x[:, 1])
+        assert mass @ (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) == pytest.approx(turned, rel=1e-3)

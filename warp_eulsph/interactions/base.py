@@ -1,6 +1,7 @@
 """What an interaction declares: forces between bodies, or between bodies and something that moves beside them."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,6 +48,24 @@ class BoundInteraction(ABC):
 
     def rebuild(self, world: "World") -> None:  # noqa: B027
         """Derive what the evolving arrays determine, after they were overwritten or particles changed places."""
+
+    def prepare(self, world: "World") -> None:  # noqa: B027  (most need nothing of the host)
+        """Do what takes the host, such as a search, before a step and on its references; may read and allocate."""
+
+    def check(self, world: "World", running: wp.array) -> None:  # noqa: B027
+        """Set ``running`` to 0, if it is 1, where ``prepare`` has something to do; launches only.
+
+        In recorded steps it takes the place of ``prepare``, which the host then calls before it takes the step.
+        """
+
+    @property
+    def waiting(self) -> bool:
+        """Whether ``check`` set ``running`` to 0 since the last ``prepare``; reads the device."""
+        return False
+
+    def recorded_for(self) -> Sequence[object]:
+        """Objects that the launches of a step are of, which ``prepare`` may replace: steps are then recorded anew."""
+        return ()
 
     @abstractmethod
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:

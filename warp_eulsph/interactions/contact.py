@@ -1,10 +1,10 @@
-"""Contact of bodies: they push each other where they touch, and do not pass through."""
+"""Contact of bodies, and of a body with itself: they push where they touch, and do not pass through."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from typing import TYPE_CHECKING
+from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -16,8 +16,10 @@ from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .friction import make_slip
 from .law import make_push, make_raise, make_rate, skin_structure
-from .nearby import Nearby
+from .moved import Moved
+from .nearby import Nearby, matter_structure
 from .skin import Skin
+from .wetting_solids import find_wettings
 
 if TYPE_CHECKING:
     from ..scheme.world import World
@@ -40,13 +42,18 @@ class Contact(Interaction):
     around. Pairs are antisymmetric in every bit. Friction is Coulomb's: half cells are sheared elastically until the
     stress is ``friction`` times the pressure, then they slide..
 
+    A body whose arrangement stays that of the start touches itself, too, where it folds, is crushed, or a notch closes:
+    matter that neither feels each other by weights nor would by this law at the start. Where the arrangement is read
+    anew what meets becomes neighbours.
+
     Args:
-        between: pairs of names of bodies that touch each other; all with all if None. Bonded bodies are one.
+        between: pairs of names of bodies that touch each other, ("ring", "ring") for one that touches itself; all with
+            all, and with themselves, if None. Bonded bodies are one.
         friction: Coulomb's coefficient, 0 without. Pairs that differ in it are a ``Contact`` each.
 
     Raises:
-        ValueError: when the simulation is built: unknown names, one body, a periodic box, bodies that lie in each other
-            at the start, or one without outermost particles (at least two particles thick).
+        ValueError: when the simulation is built: unknown names, nothing that can touch, a periodic box, bodies that lie
+            in each other at the start, or one without outermost particles (at least two particles thick).
     """
 
     between: Sequence[tuple[str, str]] | None = None
@@ -57,7 +64,7 @@ class Contact(Interaction):
             raise ValueError(f"Contact: friction must be 0 or more and finite, got {self.friction}")
         if self.between is not None:
             named = [tuple(two) if not isinstance(two, str) else (two,) for two in self.between]
-            wrong = [two for two in named if len(two) != 2 or two[0] == two[1]]
+            wrong = [two for two in named if len(two) != 2]
             if wrong or not named:
                 raise ValueError(
                     'Contact: between must be pairs of names of two bodies such as [("left", "right")], got '
@@ -77,7 +84,7 @@ class BoundContact(BoundInteraction):
         skin, nearby: from ``start`` on; and slip: elastic slip of the skin's particles [m], (k,) of vec.
     """
 
-    sortable = True
+    sortable = recordable = True
 
     def __init__(self, option: Contact, assembly: Assembly):
         names, self.rubs = list(assembly.bodies), option.friction > 0.0
@@ -88,14 +95,12 @@ class BoundContact(BoundInteraction):
             raise ValueError("Contact: periodic boxes are not for bodies that touch; leave out periodic=...")
         first = [own.start for own in assembly.bodies.values()]
         groups = assembly.particles.group.numpy()[first]
-        chosen = option.between or list(combinations(names, 2))
+        chosen = option.between or list(combinations_with_replacement(names, 2))
         numbers = [(names.index(one), names.index(other)) for one, other in chosen]
         self._felt = np.zeros((len(names), len(names)), dtype=np.int32)
         for i, j in numbers:
-            self._felt[i, j] = self._felt[j, i] = groups[i] != groups[j]
-        self.touching = frozenset((names[i], names[j]) for i, j in np.argwhere(self._felt).tolist())
-        if not self.touching:
-            raise ValueError(f"Contact: two bodies that are not bonded are needed, got {names}")
+            self._felt[i, j] = self._felt[j, i] = 1 if groups[i] != groups[j] else 2
+        self.touching = frozenset((names[i], names[j]) for i, j in np.argwhere(self._felt == 1).tolist())
         self._names = [name for k, name in enumerate(names) if self._felt[k].any()]
         self.indices = np.concatenate([np.arange(own.start, own.stop) for own in self._ranges()]).astype(np.int32)
         self._launch = Launcher(assembly.device)
@@ -105,8 +110,11 @@ class BoundContact(BoundInteraction):
 
     def start(self, world: "World") -> None:
         self._check_apart(world)
+        self._leave_out_moving(world)
+        self._passed = wp.zeros(1, dtype=wp.float64, device=world.device)
+        self._wettings = find_wettings(world, self.assembly, self._felt)
         self.skin = Skin(world, self.assembly, self._names)
-        self.nearby = Nearby(self.skin, self._felt)
+        self.nearby = Nearby(self.skin, self._felt, self._matter(world))
         self._arrays = skin_structure(self.space)()
         for name in ("places", "there", "area", "half", "modulus", "shear_modulus", "normal", "bend"):
             setattr(self._arrays, name, getattr(self.skin, name))
@@ -115,11 +123,43 @@ class BoundContact(BoundInteraction):
         self._frequency = wp.zeros(1, dtype=self.space.real, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
         self.slip = wp.zeros(k if self.rubs else 0, dtype=self.space.vec, device=device)
-        self._found_at = wp.zeros(k if self.skin.changes else 0, dtype=self.space.vec, device=device)
-        if self.skin.changes:
-            wp.copy(self._found_at, world.U.x[self.skin.places].contiguous())
+        self._found = Moved(self.space, self.skin.places, self.nearby.moved.allowed)
+        self._found.note(world.U.x)
+        self.nearby.look(world.U, world.clock.fields)
         if self._push(world, world.U, 0.0, self._nothing):
             self._measure(world, world.U)
+
+    def _leave_out_moving(self, world: "World") -> None:
+        """Bodies whose arrangement is read anew do not touch themselves."""
+        names = list(self.assembly.bodies)
+        fixed = np.concatenate([np.full(medium.n, medium.configuration.fixed) for medium in world.media])
+        stays = fixed[[own.start for own in self.assembly.bodies.values()]]
+        moving = [names[k] for k in np.flatnonzero((np.diag(self._felt) == 2) & ~stays)]
+        if moving and self.option.between is not None:
+            raise ValueError(
+                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew; what meets "
+                "there becomes neighbours. Leave them out of between, or build with arrangement=Convected()"
+            )
+        self._felt[(self._felt == 2) & ~stays] = 0
+        if not self._felt.any():
+            raise ValueError(
+                "Contact: two bodies that are not bonded, or one whose arrangement stays, which may touch itself, are "
+                f"needed, got {names}"
+            )
+
+    def _matter(self, world: "World") -> Any:
+        order, indices, device = self.assembly.order, self.skin.indices, world.device
+        support = np.concatenate([np.full(medium.n, medium.configuration.lists.support) for medium in world.media])
+        matter = matter_structure(self.space)()
+        for name, values in {
+            "X": self.assembly.X,
+            "outward": order.by_number(world.particles.outward.numpy()),
+            "spacing": order.by_number(world.particles.spacing.numpy()),
+            "support": order.by_number(support * world.particles.h.numpy()),
+        }.items():
+            dtype = self.space.real if values.ndim == 1 else self.space.vec
+            setattr(matter, name, wp.array(values[indices], dtype=dtype, device=device))
+        return matter
 
     def _check_apart(self, world: "World") -> None:
         """Raise ValueError where two bodies lie in each other."""
@@ -150,19 +190,34 @@ class BoundContact(BoundInteraction):
                 )
 
     def rebuild(self, world: "World") -> None:
+        for wetting in self._wettings:
+            wetting.rebuild()
         self.skin.rebuild()
         self.nearby.forget()
 
-    def _find(self, x: wp.array) -> None:
-        """What is outermost now, where the arrangement is read anew and particles have moved."""
-        if self.skin.changes and self.nearby.moved(x, self._found_at):
+    def prepare(self, world: "World") -> None:
+        """What is outermost now, where the arrangement is read anew and particles have moved, and what is near it."""
+        U, clock = world.U, world.clock
+        if self.skin.changes and self._found(U, clock.fields):
             self.skin.find()
-            wp.copy(self._found_at, x[self.skin.places].contiguous())
+            self._found.note(U.x)
             self.nearby.forget()
+        self.nearby.look(U, clock.fields, clock.option.growth)
+
+    def check(self, world: "World", running: wp.array) -> None:
+        if self.skin.changes:
+            self._found.check(world.U, world.clock.fields, 0.0, running)
+        self.nearby.moved.check(world.U, world.clock.fields, world.clock.option.growth, running)
+
+    @property
+    def waiting(self) -> bool:
+        return self._found.far or self.nearby.moved.far
+
+    def recorded_for(self) -> list[object]:
+        return [self.nearby.rows.index] if self.nearby.pairs else []
 
     def _push(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> bool:
         """Forces at ``state``, and the energy; whether there can be any."""
-        self.nearby.look(state.x)
         if self.nearby.pairs:
             self.skin.look(state)
             arguments = [self._arrays, self.nearby.rows, state.x, state.v, world.clock.fields, fraction]
@@ -172,6 +227,8 @@ class BoundContact(BoundInteraction):
         return self.nearby.pairs > 0
 
     def forces(self, world: "World", state: StateArrays, fraction: float, out: wp.array) -> None:
+        for wetting in self._wettings:
+            wetting.press(out)
         self._frequency.zero_()
         if self._push(world, state, fraction, out):
             self._measure(world, state)
@@ -182,25 +239,32 @@ class BoundContact(BoundInteraction):
         self._launch(make_rate(self.space), len(self.skin.indices), arguments)
 
     def rate(self, world: "World") -> None:
-        self._find(world.U.x)
         self._launch.once(make_raise(self.space), 1, [self._frequency, world.clock.fields])
 
     def advance(self, world: "World") -> None:
+        for wetting in self._wettings:
+            wetting.account(self._passed)
         if self.rubs and self.nearby.pairs:  # by normals and places of the last forces
             half, clock = world.half, world.clock.fields
             arguments = [self._arrays, self.nearby.rows, half.x, half.v, clock, self.option.friction, self.slip]
             self._launch(make_slip(self.space), len(self.skin.indices), arguments)
 
     def energy(self, world: "World") -> float:
+        self.nearby.look(world.U, world.clock.fields)
         return float(self._energy.numpy().sum()) if self._push(world, world.U, 0.0, self._nothing) else 0.0
+
+    def passed(self) -> float:
+        return float(self._passed.numpy()[0])
 
     def evolving(self) -> dict[str, wp.array]:
         held = {"frequency": self._frequency} | ({"slip": self.slip} if self.rubs else {})
         if self.skin.changes:
             held |= {
-                "found_at": self._found_at,
+                "found_at": self._found.at,
                 "there": self.skin.there,
                 "area": self.skin.area,
                 "bend": self.skin.bend,
             }
+        for k, wetting in enumerate(self._wettings):
+            held |= {"passed": self._passed} | {f"{name}.{k}": array for name, array in wetting.evolving().items()}
         return held

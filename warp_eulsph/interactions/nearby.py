@@ -1,74 +1,96 @@
-"""Which outermost particles of other bodies are near each: rows found anew only when something moved far enough."""
+"""Which outermost particles are near each that it may touch: rows found anew only when something moved far enough."""
 
 import functools
+from typing import Any
 
 import numpy as np
 import warp as wp
 
-from ..atomics import raise_to
 from ..execution import Launcher
 from ..operators.neighbours import QUERY_MARGIN
 from ..space import Space
-from .faces import REACH
+from ..structs import ClockArrays, StateArrays
+from .faces import REACH, alike_vectors
 from .law import rows_structure
+from .moved import Moved
 from .skin import Skin
 
-# How far beyond the range of forces rows reach, in spacings: a search lasts until a particle has moved half of that.
+# How far beyond the range of the law rows reach, in spacings: a search lasts until two have moved so far relative to
+# each other.
 MARGIN = 1.0
-# Range of forces, in spacings of the coarser body: across by the weight of the surface, along by the sum of two halves.
-RANGE = float(np.hypot(2.0 * REACH, 1.0))
+# Range of the law, in spacings of the coarser body: across by the weight of the surface, along two sums of two halves,
+# which is where the rate looks for what may touch in a step.
+RANGE = float(np.hypot(2.0 * REACH, 2.0))
+# Range of forces alone.
+TOUCH = float(np.hypot(2.0 * REACH, 1.0))
 
 
 @functools.cache
-def _make_moved(space: Space) -> wp.Kernel:
-    """Kernel: the largest distance from where particles were, in their spacings."""
-    real, vec = space.real, space.vec
-    raise_largest = raise_to(real)
+def matter_structure(space: Space) -> Any:
+    """``wp.struct`` of what is known of a skin's particles in the reference.
 
-    @wp.kernel(module="unique", enable_backward=False)
-    def find_moved(
-        first: int,
-        places: wp.array(dtype=wp.int32),
-        x: wp.array(dtype=vec),
-        half: wp.array(dtype=real),
-        at: wp.array(dtype=vec),
-        largest: wp.array(dtype=real),
-    ):
-        k = first + wp.tid()
-        raise_largest(largest, wp.length(x[places[k]] - at[k]) / (real(2.0) * half[k]))
+    Place [m], way out, spacing [m] and radius of the support of weights [m].
+    """
 
-    return find_moved
+    @wp.struct
+    class Matter:
+        X: wp.array(dtype=space.vec)
+        outward: wp.array(dtype=space.vec)
+        spacing: wp.array(dtype=space.real)
+        support: wp.array(dtype=space.real)
+
+    return Matter
 
 
 @functools.cache
-def _make_note(space: Space) -> wp.Kernel:
-    """Kernel: where particles are, once more as 3-vectors for the grid."""
+def _make_pad(space: Space) -> wp.Kernel:
+    """Kernel: places as 3-vectors, for the grid."""
     real, vec, dim = space.real, space.vec, space.dim
     vec3 = wp.types.vector(length=3, dtype=real)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def note(
-        first: int,
-        places: wp.array(dtype=wp.int32),
-        x: wp.array(dtype=vec),
-        at: wp.array(dtype=vec),
-        padded: wp.array(dtype=vec3),
-    ):
+    def pad(first: int, at: wp.array(dtype=vec), padded: wp.array(dtype=vec3)):
         k = first + wp.tid()
-        p = x[places[k]]
-        at[k] = p
         q = vec3()
         for i in range(wp.static(dim)):
-            q[i] = p[i]
+            q[i] = at[k][i]
         padded[k] = q
 
-    return note
+    return pad
+
+
+@functools.cache
+def _strangers(space: Space) -> wp.Function:
+    """``wp.func`` whether two outermost particles may touch, by their places and ways out in the reference.
+
+    Of other bodies all may, felt = 1. Of one (felt = 2) those that do not feel each other by weights, nor would by the
+    law in the reference, and of those so near that rows would hold them there the ones across a gap, which lie before
+    each other and do not look the same way.
+    """
+    real, Matter, alike = space.real, matter_structure(space), alike_vectors(space)
+
+    @wp.func
+    def strangers(matter: Matter, k: int, m: int, felt: int) -> bool:
+        if felt < 2:
+            return felt == 1
+        d = matter.X[m] - matter.X[k]
+        apart = wp.length(d)
+        spacing = wp.max(matter.spacing[k], matter.spacing[m])
+        known = wp.max(real(0.5) * (matter.support[k] + matter.support[m]), real(TOUCH) * spacing)
+        if apart < known:
+            return False
+        if apart < real(wp.static(RANGE + MARGIN)) * spacing:
+            before = wp.dot(d, matter.outward[k]) > real(0.0) and wp.dot(d, matter.outward[m]) < real(0.0)
+            return before and not alike(matter.outward[k], matter.outward[m])
+        return True
+
+    return strangers
 
 
 @functools.cache
 def _make_search(space: Space, fill: bool) -> wp.Kernel:
     """Kernel: count a row, or (``fill``) write it sorted by index."""
-    real = space.real
+    real, Matter, strangers = space.real, matter_structure(space), _strangers(space)
     vec3 = wp.types.vector(length=3, dtype=real)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -79,6 +101,7 @@ def _make_search(space: Space, fill: bool) -> wp.Kernel:
         there: wp.array(dtype=wp.int32),
         bodies: wp.array(dtype=wp.int32),
         felt: wp.array2d(dtype=wp.int32),
+        matter: Matter,
         half: wp.array(dtype=real),
         longest: real,
         count: wp.array(dtype=wp.int32),
@@ -93,7 +116,7 @@ def _make_search(space: Space, fill: bool) -> wp.Kernel:
         if there[k] == 1:
             reach = real(wp.static(RANGE + MARGIN))
             for m in wp.hash_grid_query(grid, padded[k], reach * longest * real(QUERY_MARGIN)):
-                if there[m] == 1 and felt[bodies[k], bodies[m]] == 1:
+                if there[m] == 1 and strangers(matter, k, m, felt[bodies[k], bodies[m]]):
                     spacing = real(2.0) * wp.max(half[k], half[m])
                     if wp.length(padded[m] - padded[k]) < reach * spacing:
                         if wp.static(fill):
@@ -110,61 +133,55 @@ def _make_search(space: Space, fill: bool) -> wp.Kernel:
 
 
 class Nearby:
-    """For each particle of a skin those of other bodies that forces may reach, in sorted rows.
+    """For each particle of a skin those that forces may reach, of other bodies or across a gap, in sorted rows.
 
     Rows hold more than is in range, and what is not adds nothing, so that forces do not depend on when they were found.
 
     Args:
         skin: its particles are numbered 0, 1, ….
-        felt: whether two bodies feel each other, (bodies, bodies) of 0 and 1, symmetric.
+        felt: whether two bodies feel each other, (bodies, bodies), symmetric: 0 no, 1 yes, 2 where they are one piece
+            of matter, such as a body and itself.
+        matter: struct of ``matter_structure``.
 
     Attributes:
         rows: struct of ``start`` and ``index``, int32: row k is ``index[start[k]:start[k+1]]``.
         pairs: entries in the rows; where there are none nothing is near. searches: so far.
     """
 
-    def __init__(self, skin: Skin, felt: np.ndarray):
+    def __init__(self, skin: Skin, felt: np.ndarray, matter: Any):
         self.skin, self.space = skin, skin.space
         self.device = device = skin.places.device
         self._launch, space, k = Launcher(device), skin.space, len(skin.indices)
+        self._matter = matter
         self._felt = wp.array(felt, dtype=wp.int32, device=device)
-        self.at = wp.zeros(k, dtype=space.vec, device=device)
         self._padded = wp.zeros(k, dtype=wp.types.vector(length=3, dtype=space.real), device=device)
         self._count = wp.zeros(k + 1, dtype=wp.int32, device=device)
         self.rows = rows_structure()()
         self.rows.start, self.rows.index = wp.zeros(k + 1, dtype=wp.int32, device=device), self._room(0)
-        self._largest = wp.zeros(1, dtype=space.real, device=device)
         spacing = 2.0 * skin.half.numpy()
         self._longest = float(spacing.max())
-        # Two particles may near each other by as much as the shorter spacing
-        self._allowed = 0.5 * MARGIN * float(spacing.min()) / self._longest
+        self.moved = Moved(space, skin.places, MARGIN * float(spacing.min()))
         side = int(np.clip(2 ** round(np.log2(max(k, 1)) / space.dim), 8, 128))
         sides = [side if axis < space.dim else 1 for axis in range(3)]
         self._grid = wp.HashGrid(*sides, device=device, dtype=space.real)
-        self.pairs, self.searches, self._stale = 0, 0, True
+        self.pairs, self.searches = 0, 0
 
     def _room(self, pairs: int) -> wp.array:
         return wp.zeros(pairs, dtype=wp.int32, device=self.device)
 
     def forget(self) -> None:
         """Have the next look search, for what is outermost has changed, or where it is."""
-        self._stale = True
+        self.moved.forget()
 
-    def moved(self, x: wp.array, at: wp.array) -> bool:
-        """Whether a particle is far from where it was; reads the device."""
-        self._largest.zero_()
-        arguments = [self.skin.places, x, self.skin.half, at, self._largest]
-        self._launch(_make_moved(self.space), len(at), arguments)
-        return not float(self._largest.numpy()[0]) <= self._allowed
-
-    def look(self, x: wp.array) -> None:
-        """See that the rows hold all pairs in range at ``x`` [m], (n,) of vec by place; reads the device."""
-        if self._stale or self.moved(x, self.at):
-            self._search(x)
+    def look(self, state: StateArrays, clock: ClockArrays, ahead: float = 0.0) -> None:
+        """See that rows hold all in range at ``state``, and ``ahead`` last steps later; reads the device."""
+        if self.moved(state, clock, ahead):
+            self._search(state.x)
 
     def _search(self, x: wp.array) -> None:
-        skin, k = self.skin, len(self.at)
-        self._launch(_make_note(self.space), k, [skin.places, x, self.at, self._padded])
+        skin, k = self.skin, len(self.skin.indices)
+        self.moved.note(x)
+        self._launch(_make_pad(self.space), k, [self.moved.at, self._padded])
         self._grid.build(self._padded, (RANGE + MARGIN) * self._longest * QUERY_MARGIN)
         self._fill(False)
         wp.utils.array_scan(self._count, self.rows.start, inclusive=False)
@@ -174,10 +191,11 @@ class Nearby:
         if self.pairs:
             self._fill(True)
             skin.want(self.rows.start)
-        self._stale, self.searches = False, self.searches + 1
+        self.searches += 1
 
     def _fill(self, fill: bool) -> None:
         skin = self.skin
-        arguments = [self._grid.id, self._padded, skin.there, skin.bodies, self._felt, skin.half, self._longest]
+        arguments = [self._grid.id, self._padded, skin.there, skin.bodies, self._felt, self._matter]
+        arguments += [skin.half, self._longest]
         arguments += [self._count, self.rows.start, self.rows.index]
-        self._launch(_make_search(self.space, fill), len(self.at), arguments)
+        self._launch(_make_search(self.space, fill), len(self._padded), arguments)

@@ -228,7 +228,7 @@ def _make_power(space: Space) -> wp.Kernel:
 
 
 @wp.kernel(module="unique", enable_backward=False)
-def _add_up(step: wp.array(dtype=wp.float64), total: wp.array(dtype=wp.float64)):
+def add_up(step: wp.array(dtype=wp.float64), total: wp.array(dtype=wp.float64)):
     total[0] = total[0] + step[0]
 
 
@@ -293,4 +293,4 @@ class Wetting:
         arguments = [*self._of(), mean, moves, push, clock.dt, self._powers]
         self._launch(_make_power(self.space), len(self._wet), arguments)
         self._add(self._powers, self._step)
-        self._launch.once(_add_up, 1, [self._step, total])
+        self._launch.once(add_up, 1, [self._step, total])

@@ -28,7 +28,7 @@ class StepGraphs:
         self._by_count = all(medium.policy.by_count for medium in stepper.media)
         self._taken: set[tuple[int, ...]] = set()
         self._graphs: dict[tuple[int, ...], wp.Graph] = {}
-        self._lists: list[wp.array] = []  # the graphs are of these lists, which may grow
+        self._recorded_for: list[object] = []  # such as lists, which may grow
 
     def take(self, most: int) -> None:
         """Take steps, ``most`` at most, fewer when the target is reached or a particle turns bad."""
@@ -38,7 +38,7 @@ class StepGraphs:
             stepper.step()
             self._taken.add(due)
             return
-        self._forget_old_lists()
+        self._forget_old()
         clock.open_batch()
         launched, batch = 0, []
         while due in self._taken:
@@ -50,16 +50,21 @@ class StepGraphs:
             due = stepper.due(stepper.steps + launched)
         taken = clock.taken
         stepper.steps += taken
-        if taken < launched and any(medium.configuration.lists.waiting for medium in stepper.media):
-            stepper.finish_refresh(batch[taken])
-            stepper.move_on()
-            stepper.steps += 1
+        if taken < launched:
+            full = any(medium.configuration.lists.waiting for medium in stepper.media)
+            if full:
+                stepper.finish_refresh(batch[taken])
+            if full or any(interaction.waiting for interaction in stepper.interactions):
+                stepper.prepare()
+                stepper.move_on()
+                stepper.steps += 1
 
-    def _forget_old_lists(self) -> None:
-        lists = [medium.configuration.near.index for medium in self.stepper.media]
-        if len(lists) != len(self._lists) or any(a is not b for a, b in zip(lists, self._lists, strict=True)):
+    def _forget_old(self) -> None:
+        now: list[object] = [medium.configuration.near.index for medium in self.stepper.media]
+        now += [each for interaction in self.stepper.interactions for each in interaction.recorded_for()]
+        if len(now) != len(self._recorded_for) or any(a is not b for a, b in zip(now, self._recorded_for, strict=True)):
             self._graphs.clear()
-            self._lists = lists
+            self._recorded_for = now
 
     def _graph(self, due: tuple[int, ...]) -> wp.Graph:
         if due not in self._graphs:
@@ -72,4 +77,10 @@ class StepGraphs:
         stepper, running = self.stepper, self.stepper.clock.fields.running
         if due:
             stepper.refresh(due, ByGraph(running))
+        if stepper.interactions:
+            wp.capture_if(running, self._check)
         wp.capture_if(running, stepper.move_on)
+
+    def _check(self) -> None:
+        for interaction in self.stepper.interactions:
+            interaction.check(self.stepper, self.stepper.clock.fields.running)

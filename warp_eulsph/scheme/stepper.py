@@ -25,8 +25,14 @@ class Stepper(World, ABC):
         due = self.due(self.steps)  # k = 0, every few steps, or n
         if due:
             self.refresh(due)
+        self.prepare()
         self.move_on()
         self.steps += 1
+
+    def prepare(self) -> None:
+        """What interactions need of the host before a step."""
+        for interaction in self.interactions:
+            interaction.prepare(self)
 
     def move_on(self) -> None:
         """Advance U on the present references, and what interactions have of their own; launches only."""

@@ -1,0 +1,326 @@
+"""Solids in the sums of a liquid: their particles are matter beside it, as they are (M28)."""
+
+import functools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ..boundaries import Assembly
+from ..execution import Launcher
+from ..fields import structure
+from ..operators.neighbours import QUERY_MARGIN
+from ..reduce import Sum
+from ..scheme.reference import LARGEST_GROWTH
+from ..space import Space
+from ..weights import Weight
+from ..weights.base import pair_weight
+from .wetting import MOST, add_up
+
+if TYPE_CHECKING:
+    from ..scheme.medium import Medium
+    from ..scheme.world import World
+
+
+@functools.cache
+def _grid_vector(space: Space) -> Any:
+    return wp.types.vector(length=3, dtype=space.real)
+
+
+@functools.cache
+def _make_note(space: Space) -> wp.Kernel:
+    """Kernel: where particles are, as 3-vectors for the grid."""
+    vec, dim, real, vec3 = space.vec, space.dim, space.real, _grid_vector(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def note(first: int, places: wp.array(dtype=wp.int32), x: wp.array(dtype=vec), padded: wp.array(dtype=vec3)):
+        i = first + wp.tid()
+        q = vec3()
+        for j in range(wp.static(dim)):
+            q[j] = real(x[places[i]][j])
+        padded[i] = q
+
+    return note
+
+
+@functools.cache
+def _pair(weight: Weight, space: Space) -> wp.Function:
+    """``wp.func`` (x_a, x_b, h_a, κ V_b) -> 2 κ V_b g_ab ξ [1/m], G of one particle of a solid."""
+    vec, real, dim, vec3, g_of = space.vec, space.real, space.dim, _grid_vector(space), pair_weight(weight, space)
+
+    @wp.func
+    def pair(x_a: vec3, x_b: vec3, h: real, kappa_V: real) -> vec:
+        xi = vec()
+        for j in range(wp.static(dim)):
+            xi[j] = x_b[j] - x_a[j]
+        return xi * (real(2.0) * kappa_V * g_of(wp.length(xi), h))
+
+    return pair
+
+
+@functools.cache
+def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
+    """Kernel: which particles of the liquid have solids in their sums, and L of these: whole across (M28)."""
+    vec, real, dim, vec3, pair = space.vec, space.real, space.dim, _grid_vector(space), _pair(weight, space)
+    Reference, reach = structure(space, "Reference"), float(weight.support) * QUERY_MARGIN
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def meet(
+        first: int,
+        solids: wp.uint64,
+        at: wp.array(dtype=vec3),
+        V: wp.array(dtype=real),
+        own: wp.array(dtype=vec3),
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        reference: Reference,
+        kappa: wp.array(dtype=real),
+        wet: wp.array(dtype=wp.int32),
+    ):
+        k = first + wp.tid()
+        a = members[k] - offset
+        total = vec()
+        scatter = real(0.0)
+        for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
+            total += pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+        wet[k] = int(wp.length_sq(total) > real(0.0))
+        if wet[k] == 1:
+            n = wp.normalize(total)
+            for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
+                G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+                xi = vec()
+                for j in range(wp.static(dim)):
+                    xi[j] = at[i][j] - own[k][j]
+                scatter += real(0.5) * (wp.dot(G, xi) - wp.dot(G, n) * wp.dot(n, xi))
+            across = real(0.0)
+            if wp.static(dim > 1):
+                across = wp.min(scatter / real(wp.static(max(dim - 1, 1))), real(MOST))
+            grown = wp.sqrt(real(1.0) / (real(1.0) - across))
+            A = wp.identity(n=wp.static(dim), dtype=real) * grown + wp.outer(n, n) * (real(1.0) - grown)
+            reference.L[a] = A @ reference.L[a] @ A
+
+    return meet
+
+
+@functools.cache
+def _make_gradient(weight: Weight, space: Space) -> wp.Kernel:
+    """Kernel: ∇v_a += Σ_b (v_b − v_a) ⊗ G_ab."""
+    vec, mat, real, vec3, pair = space.vec, space.mat, space.real, _grid_vector(space), _pair(weight, space)
+    Reference, reach = structure(space, "Reference"), float(weight.support) * QUERY_MARGIN
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def add_gradient(
+        first: int,
+        solids: wp.uint64,
+        at: wp.array(dtype=vec3),
+        V: wp.array(dtype=real),
+        places: wp.array(dtype=wp.int32),
+        own: wp.array(dtype=vec3),
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        reference: Reference,
+        kappa: wp.array(dtype=real),
+        wet: wp.array(dtype=wp.int32),
+        v: wp.array(dtype=vec),
+        share: real,
+        out: wp.array(dtype=mat),
+    ):
+        k = first + wp.tid()
+        a = members[k] - offset
+        if wet[k] == 1:
+            total = mat()
+            for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
+                G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+                total += wp.outer(v[places[i]] - v[members[k]], G)
+            out[a] = out[a] + total * share
+
+    return add_gradient
+
+
+@functools.cache
+def _make_force(weight: Weight, space: Space) -> wp.Kernel:
+    """Kernel: on the liquid, V_a Q_a Σ_b G_ab; and what that gradient does to its store, f_ab·(v̄_b − v̄_a) Δt."""
+    vec, real, vec3, pair = space.vec, space.real, _grid_vector(space), _pair(weight, space)
+    Reference, Flux, reach = structure(space, "Reference"), structure(space, "Flux"), weight.support * QUERY_MARGIN
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def force_on_liquid(
+        first: int,
+        solids: wp.uint64,
+        at: wp.array(dtype=vec3),
+        V: wp.array(dtype=real),
+        places: wp.array(dtype=wp.int32),
+        own: wp.array(dtype=vec3),
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        reference: Reference,
+        flux: Flux,
+        kappa: wp.array(dtype=real),
+        wet: wp.array(dtype=wp.int32),
+        v: wp.array(dtype=vec),
+        dt: wp.array(dtype=wp.float64),
+        power: wp.array(dtype=wp.float64),
+        out: wp.array(dtype=vec),
+    ):
+        k = first + wp.tid()
+        a = members[k] - offset
+        power[k] = wp.float64(0.0)
+        if wet[k] == 1:
+            force = vec()
+            rate = real(0.0)
+            for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
+                f = (flux.Q[a] @ pair(own[k], at[i], reference.h[a], kappa[a] * V[i])) * reference.V[a]
+                force += f
+                rate += wp.dot(f, v[places[i]] - v[members[k]])
+            out[members[k]] = out[members[k]] + force
+            power[k] = dt[0] * wp.float64(rate)
+
+    return force_on_liquid
+
+
+@functools.cache
+def _make_reaction(weight: Weight, space: Space) -> wp.Kernel:
+    """Kernel: the opposite on the solids."""
+    vec, real, vec3, pair = space.vec, space.real, _grid_vector(space), _pair(weight, space)
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def force_on_solid(
+        first: int,
+        liquid: wp.uint64,
+        reach: real,
+        at: wp.array(dtype=vec3),
+        V: wp.array(dtype=real),
+        places: wp.array(dtype=wp.int32),
+        own: wp.array(dtype=vec3),
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        reference: Reference,
+        flux: Flux,
+        kappa: wp.array(dtype=real),
+        out: wp.array(dtype=vec),
+    ):
+        i = first + wp.tid()
+        force = vec()
+        for k in wp.hash_grid_query(liquid, at[i], reach):
+            a = members[k] - offset
+            force -= (flux.Q[a] @ pair(own[k], at[i], reference.h[a], kappa[a] * V[i])) * reference.V[a]
+        out[places[i]] = out[places[i]] + force
+
+    return force_on_solid
+
+
+class WettingOfSolids:
+    """The solids in the sums of one liquid (a ``Wall`` of its medium).
+
+    Args:
+        world: at its start.
+        assembly: what it was bound with.
+        medium: of the liquid, with ``Uncorrected`` sums.
+        numbers: of the particles of the solids, (m,) int32.
+    """
+
+    def __init__(self, world: "World", assembly: Assembly, medium: "Medium", numbers: np.ndarray):
+        self.world, self.medium, self.space = world, medium, world.space
+        device, space, n, m = world.device, world.space, medium.n, len(numbers)
+        self._launch, self._weight = Launcher(device), medium.configuration.weight
+        self._places = assembly.order.places_of(numbers)
+        span = np.arange(medium.span.start, medium.span.stop, dtype=np.int32)
+        self._members = assembly.order.places_of(span)
+        V0 = assembly.order.by_number(world.particles.V0.numpy())[numbers]
+        self._V = wp.array(V0, dtype=space.real, device=device)
+        self._at, self._own = (wp.zeros(k, dtype=_grid_vector(space), device=device) for k in (m, n))
+        self._wet = wp.zeros(n, dtype=wp.int32, device=device)
+        sides = [64 if axis < space.dim else 1 for axis in range(3)]
+        self._solids, self._liquid = (wp.HashGrid(*sides, device=device, dtype=space.real) for _ in range(2))
+        self._reach = float(self._weight.support) * float(medium.particles.h.numpy().max()) * QUERY_MARGIN
+        self._power, self._add = wp.zeros(n, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
+        self._nothing, self._step = (
+            wp.zeros(world.n, dtype=space.vec, device=device),
+            wp.zeros(1, dtype=wp.float64, device=device),
+        )
+
+    def _note(self) -> None:
+        x = self.world.U.x
+        self._launch(_make_note(self.space), len(self._places), [self._places, x, self._at])
+        self._launch(_make_note(self.space), len(self._own), [self._members, x, self._own])
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """The grids of where all were."""
+        self._solids.build(self._at, self._reach)
+        self._liquid.build(self._own, self._reach)
+
+    def renew(self) -> None:
+        """Where all are in the present reference, which of the liquid is wet, and L of it."""
+        self._note()
+        reference, kappa = self.medium.configuration.fields, self.medium.stabiliser.kappa
+        arguments = [self._solids.id, self._at, self._V, *self._liquid_members(), reference, kappa, self._wet]
+        self._launch(_make_meet(self._weight, self.space), len(self._wet), arguments)
+
+    def _liquid_members(self) -> list[Any]:
+        return [self._own, self._members, self.medium.span.start]
+
+    def _of(self) -> list[Any]:
+        liquid, reference = self._liquid_members(), self.medium.configuration.fields
+        return [self._solids.id, self._at, self._V, self._places, *liquid, reference]
+
+    def add_gradient(self, v: wp.array, share: float, out: wp.array) -> None:
+        """Add a share of what solids add to ∇_k v (M28)."""
+        world, medium = self.world, self.medium
+        whole = world.half.v if v.ptr == medium.of(world.half).v.ptr else world.U.v
+        arguments = [*self._of(), medium.stabiliser.kappa, self._wet, whole, share, out]
+        self._launch(_make_gradient(self._weight, self.space), len(self._wet), arguments)
+
+    def press(self, out: wp.array) -> None:
+        """Add forces [N] on all particles to ``out``, (n,) of vec."""
+        self._press_liquid(out)
+        medium = self.medium
+        arguments = [self._liquid.id, LARGEST_GROWTH * self._reach, self._at, self._V, self._places]
+        arguments += [
+            *self._liquid_members(),
+            medium.configuration.fields,
+            medium.flux.fields,
+            medium.stabiliser.kappa,
+            out,
+        ]
+        self._launch(_make_reaction(self._weight, self.space), len(self._places), arguments)
+
+    def _press_liquid(self, out: wp.array) -> None:
+        medium, world = self.medium, self.world
+        arguments = [*self._of(), medium.flux.fields, medium.stabiliser.kappa, self._wet, world.half.v]
+        arguments += [world.clock.fields.dt, self._power, out]
+        self._launch(_make_force(self._weight, self.space), len(self._wet), arguments)
+
+    def account(self, total: wp.array) -> None:
+        """Add to ``total`` [J] what solids did in the step to the energy that the liquid stores."""
+        self._press_liquid(self._nothing)
+        self._add(self._power, self._step)
+        self._launch.once(add_up, 1, [self._step, total])
+
+    def evolving(self) -> dict[str, wp.array]:
+        """Where all were in the present reference, and which of the liquid is wet."""
+        return {"at": self._at, "own": self._own, "wet": self._wet}
+
+
+def find_wettings(world: "World", assembly: Assembly, felt: np.ndarray) -> list[WettingOfSolids]:
+    """One for each liquid that has solids in its sums, at work.
+
+    Args:
+        felt: whether bodies feel each other, (bodies, bodies) of 0 and 1; a liquid and its solids no longer do.
+    """
+    found, ranges = [], list(assembly.bodies.values())
+    flows = np.zeros(len(ranges), dtype=bool)
+    mediums = [medium for medium in world.media if medium.stabiliser.takes_walls]
+    inside = [[own.start in medium.span for own in ranges] for medium in mediums]
+    for mask in inside:
+        flows |= np.array(mask)
+    for medium, mask in zip(mediums, inside, strict=True):
+        solids = [j for j in range(len(ranges)) if not flows[j] and felt[np.array(mask)][:, j].any()]
+        if solids:
+            for j in solids:
+                felt[np.array(mask), j] = felt[j, np.array(mask)] = 0
+            numbers = np.concatenate([np.arange(ranges[j].start, ranges[j].stop) for j in solids]).astype(np.int32)
+            found.append(WettingOfSolids(world, assembly, medium, numbers))
+            medium.walls.take(found[-1])
+    return found
