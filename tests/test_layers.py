@@ -40,7 +40,7 @@ FRONT_ENDS = {"cli.py"} | {
     f"bench/{name}.py" for name in ("command", "equal_error", "many_runs", "mixing", "release", "snapshot_cost")
 }
 FRONT_ENDS |= {
-    f"validation/{name}.py" for name in ("command", "punch_elements", "step_cost", "balance_sweeps", "coarse")
+    f"validation/{name}.py" for name in ("command", "punch_elements", "step_cost", "balance_sweeps", "coarse", "rods")
 }
 FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 

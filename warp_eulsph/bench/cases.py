@@ -7,13 +7,15 @@ import numpy as np
 import warp as wp
 
 from ..geometry import box
-from ..materials import Material, NeoHookean
+from ..materials import J2, LinearHardening, Material, NeoHookean
 from ..scheme.arrangement import Current
 from ..scheme.policy import Always, Every, Never, ReferencePolicy
 from ..simulation import Body, Simulation
 
 STEPS_PER_REFRESH = 10  # of the mode every_k
 MODES: dict[str, ReferencePolicy] = {"total": Never(), "every_k": Every(STEPS_PER_REFRESH), "eulerian": Always()}
+#: Of the stiffness of the rubber, yielding all over once it moves: what plasticity costs.
+METAL = J2(density=1100.0, young=17e6, poisson=0.45, hardening=LinearHardening(yield_stress=1e4, modulus=1e5))
 DTYPES = {"float32": wp.float32, "float64": wp.float64}
 
 
@@ -71,6 +73,7 @@ def _all() -> Iterator[BenchCase]:
     for mode in ("total", "eulerian"):
         for dtype in DTYPES:
             yield BenchCase(f"{mode}-3d-{dtype}-2-threads", 3, dtype, mode, 37, threads=2)
+            yield BenchCase(f"{mode}-3d-{dtype}-yielding", 3, dtype, mode, 37, material=METAL)
         for size, side in (("10k", 22), ("100k", 46), ("400k", 74), ("1M", 100)):
             yield BenchCase(f"{mode}-3d-float64-{size}", 3, "float64", mode, side)
         for order in ("shuffled", "sorted"):

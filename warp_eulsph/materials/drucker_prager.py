@@ -103,7 +103,7 @@ def _law(space: Space) -> Law:
 
     law = Law(Constants, None, None, None, history=HISTORY)
     row = history_row(space, law)
-    trial, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
+    trial, _, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
 
     @wp.func
     def elastic_volume(F: mat, h: row) -> real:

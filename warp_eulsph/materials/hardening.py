@@ -149,7 +149,7 @@ class Tabulated(Hardening):
 
 @dataclass(frozen=True, kw_only=True)
 class JohnsonCook(Hardening):
-    """y = (A + B αⁿ)(1 + C ln max(α̇/ε̇₀, 1))(1 − T*ᵐ), T* = (T − T₀)/(T_m − T₀) in [0, 1] (Johnson & Cook 1983).
+    """y = (A + B αⁿ)(1 + C ln max(α̇/ε̇₀, 1))(1 − T*ᵐ), T* = (T − T_r)/(T_m − T_r) in [0, 1] (Johnson & Cook 1983).
 
     No heat is conducted: T rises by ``taylor_quinney`` times the plastic work over ρ₀ c_p. Steps take T of their start.
 
@@ -160,10 +160,11 @@ class JohnsonCook(Hardening):
         C: sensitivity to the rate.
         reference_rate: ε̇₀ [1/s].
         m: exponent of softening.
-        temperature: at the start and of the reference, T₀ [K].
+        temperature: at the start [K].
         melting: T_m [K].
         specific_heat: c_p [J/(kg K)].
         taylor_quinney: share of the plastic work that becomes heat; 0 is isothermal.
+        reference_temperature: T_r [K], at which A and B were measured; None is that at the start.
     """
 
     A: float
@@ -176,6 +177,7 @@ class JohnsonCook(Hardening):
     melting: float = 1356.0
     specific_heat: float = 383.0
     taylor_quinney: float = 0.9
+    reference_temperature: float | None = None
     heats: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -186,6 +188,10 @@ class JohnsonCook(Hardening):
         positive("specific_heat", self.specific_heat, "J/(kg K)")
         if not (math.isfinite(self.melting) and self.melting > self.temperature):
             raise ValueError(f"melting must be finite and above temperature = {self.temperature} K, got {self.melting}")
+        if self.reference_temperature is not None:
+            positive("reference_temperature", self.reference_temperature, "K")
+            if self.melting <= self.reference_temperature:
+                raise ValueError(f"melting = {self.melting} K must be above reference_temperature")
         if not 0.0 <= self.taylor_quinney <= 1.0:
             raise ValueError(f"taylor_quinney must be in [0, 1], got {self.taylor_quinney}; 0.9 is usual for metals")
 
@@ -193,8 +199,10 @@ class JohnsonCook(Hardening):
         return self.temperature, self.taylor_quinney / (density * self.specific_heat)
 
     def constants(self) -> dict[str, Any]:
-        names = ("A", "B", "n", "C", "reference_rate", "m", "temperature")
-        return {name: getattr(self, name) for name in names} | {"range": self.melting - self.temperature}
+        reference = self.temperature if self.reference_temperature is None else self.reference_temperature
+        names = ("A", "B", "n", "C", "reference_rate", "m")
+        found = {name: getattr(self, name) for name in names}
+        return found | {"temperature": reference, "range": self.melting - reference}
 
     @staticmethod
     @functools.cache

@@ -105,7 +105,7 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
     determinant, invert, heats = det(space), inverse(space), hardening.heats
     law = Law(Constants, None, None, None, history=history)
     row = history_row(space, law)
-    trial, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
+    trial, most, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
 
     @wp.func
     def temperature(h: row) -> real:
@@ -142,13 +142,15 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
 
     @wp.func
     def update(F: mat, rate: mat, h: row, dt: real, c: Constants):
+        T = temperature(h)
+        if real(2.0) * real(shortened) * c.mu * most(F, h) < yield_stress(h[6], real(0.0), T, c):
+            return F, h, real(0.0)
         e = trial(F, h)
         found = flow(e, h, dt, c)
         delta = found[0]
         if delta == real(0.0):
             return F, h, real(0.0)
         speed = delta / dt
-        T = temperature(h)
         y = yield_stress(h[6], speed, T, c) + yield_stress(h[6] + delta, speed, T, c)
         work = real(0.5) * y * delta
         out = flowed(F, h, e * found[1])

@@ -13,8 +13,9 @@ import warp as wp
 from ..linalg import symmetric_eigen
 from ..space import Space, matrix_type
 
-# Largest |eigenvalue| for which the series of ln(1 + X) is taken, and the one that exp's arguments are halved to.
-LARGEST_OF_LOG, LARGEST_OF_EXP = 0.1, 0.2
+# Largest |eigenvalue| for which the series of ln(1 + X) is taken, that to which arguments of exp are halved, and one
+# that metals seldom pass, to which shorter series do.
+LARGEST_OF_LOG, LARGEST_OF_EXP, SELDOM_PASSED = 0.1, 0.2, 0.02
 # Of a traceless 3 × 3 matrix the largest eigenvalue is at most √(2/3) of its norm.
 SHARE = math.sqrt(2.0 / 3.0)
 
@@ -29,9 +30,22 @@ def _terms(real: type, first_left_out: Any) -> int:
 def deviatoric_logarithm(real: type) -> wp.Function:
     """``wp.func`` dev ln b of a symmetric, positive definite b, exact to round-off; NaN for others."""
     mat, vec = matrix_type(3, 3, real), Space(3, real).vec
-    terms = _terms(real, lambda k: LARGEST_OF_LOG**k / (k + 1))
-    small = (LARGEST_OF_LOG / SHARE) ** 2
+    few, terms = (_terms(real, lambda k, x=x: x**k / (k + 1)) for x in (SELDOM_PASSED, LARGEST_OF_LOG))
+    tiny, small = ((x / SHARE) ** 2 for x in (SELDOM_PASSED, LARGEST_OF_LOG))
     eigen = symmetric_eigen(Space(3, real))
+
+    def series(terms: int) -> wp.Function:
+        @wp.func
+        def series(c2: real, c3: real) -> vec:
+            """S with −ln(1 − X) = X S, S = S₀ + S₁ X + S₂ X²."""
+            out = vec()
+            for k in range(wp.static(terms)):  # Horner: S ← 1/n + X S, n = terms … 1
+                out = vec(real(1.0) / real(wp.static(terms) - k) + c3 * out[2], out[0] + c2 * out[2], out[1])
+            return out
+
+        return series
+
+    short, long = series(few), series(terms)
 
     @wp.func
     def deviatoric_logarithm(b: mat) -> mat:
@@ -42,16 +56,12 @@ def deviatoric_logarithm(real: type) -> wp.Function:
         if norm < real(small):
             c2 = real(0.5) * norm
             c3 = wp.determinant(X)
-            s0 = real(0.0)
-            s1 = real(0.0)
-            s2 = real(0.0)
-            for k in range(wp.static(terms)):  # Horner: S ← 1/n + X S, n = terms … 1; −ln(1 − X) = X S
-                t0 = real(1.0) / real(terms - k) + c3 * s2
-                t1 = s0 + c2 * s2
-                s2 = s1
-                s1 = t1
-                s0 = t0
-            return (unit * (norm / real(3.0)) - square) * s1 - X * (s0 + c2 * s2)
+            S = vec()
+            if norm < real(tiny):
+                S = short(c2, c3)
+            else:
+                S = long(c2, c3)
+            return (unit * (norm / real(3.0)) - square) * S[1] - X * (S[0] + c2 * S[2])
         R, values = eigen(b)
         e = vec(wp.log(values[0]), wp.log(values[1]), wp.log(values[2]))
         mean = (e[0] + e[1] + e[2]) / real(3.0)
@@ -63,32 +73,38 @@ def deviatoric_logarithm(real: type) -> wp.Function:
 @functools.cache
 def exponential(real: type) -> wp.Function:
     """``wp.func`` exp(E) of a symmetric, traceless E, exact to round-off."""
-    mat = matrix_type(3, 3, real)
-    terms = _terms(real, lambda k: LARGEST_OF_EXP**k / math.factorial(k))
-    small = LARGEST_OF_EXP / SHARE
+    mat, vec = matrix_type(3, 3, real), Space(3, real).vec
+    few, terms = (_terms(real, lambda k, x=x: x**k / math.factorial(k)) for x in (SELDOM_PASSED, LARGEST_OF_EXP))
+    tiny, small = SELDOM_PASSED / SHARE, LARGEST_OF_EXP / SHARE
+
+    def series(terms: int) -> wp.Function:
+        @wp.func
+        def series(X: mat) -> mat:
+            square = X @ X
+            c2 = real(0.5) * wp.trace(square)
+            c3 = wp.determinant(X)
+            S = vec(real(1.0), real(0.0), real(0.0))
+            for k in range(wp.static(terms)):  # Horner: S ← 1 + X S / n, n = terms … 1
+                S = S * (real(1.0) / real(wp.static(terms) - k))
+                S = vec(real(1.0) + c3 * S[2], S[0] + c2 * S[2], S[1])
+            return wp.identity(n=3, dtype=real) * S[0] + X * S[1] + square * S[2]
+
+        return series
+
+    short, long = series(few), series(terms)
 
     @wp.func
     def exponential(E: mat) -> mat:
         size = wp.sqrt(wp.ddot(E, E))
+        if size < real(tiny):
+            return short(E)
         halvings = int(0)
+        share = real(1.0)
         while size > real(small) and halvings < 64:
             size *= real(0.5)
+            share *= real(0.5)
             halvings += 1
-        X = E * wp.pow(real(0.5), real(halvings))
-        square = X @ X
-        c2 = real(0.5) * wp.trace(square)
-        c3 = wp.determinant(X)
-        s0 = real(1.0)
-        s1 = real(0.0)
-        s2 = real(0.0)
-        for k in range(wp.static(terms)):  # Horner: S ← 1 + X S / n, n = terms … 1
-            share = real(1.0) / real(terms - k)
-            t0 = real(1.0) + c3 * s2 * share
-            t1 = (s0 + c2 * s2) * share
-            s2 = s1 * share
-            s1 = t1
-            s0 = t0
-        out = wp.identity(n=3, dtype=real) * s0 + X * s1 + square * s2
+        out = long(E * share)
         for _ in range(halvings):
             out = out @ out
         return out

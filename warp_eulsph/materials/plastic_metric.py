@@ -28,6 +28,7 @@ class Kinematics(NamedTuple):
 
     Attributes:
         trial: (F, h) -> dev e (full).
+        most: (F, h) -> a bound of |dev e|, without the series: |ln(1 − x)| ≤ x/(1 − x).
         flowed: (F, h, dev e) -> h whose C_p⁻¹ leaves this of the elastic strain.
         rebased: (F, h) -> (F, h) of the same det F and dev e, with what is left of F after plastic flow.
         moduli: (F, h, t, μ, κ) -> (M, μ_s) as ``Law.wave_moduli``, t = tr τ/3, of Ψ = ψ(ln J) + μ |dev e|², ψ'' = κ.
@@ -35,6 +36,7 @@ class Kinematics(NamedTuple):
     """
 
     trial: wp.Function
+    most: wp.Function
     flowed: wp.Function
     rebased: wp.Function
     moduli: wp.Function
@@ -77,6 +79,13 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
         return logarithm(left_elastic(F, h)) * real(0.5)
 
     @wp.func
+    def most(F: mat, h: row) -> real:
+        b = left_elastic(F, h)
+        X = wp.identity(n=3, dtype=real) - b * (real(3.0) / wp.trace(b))
+        norm = wp.sqrt(wp.ddot(X, X))
+        return real(0.5) * norm / wp.max(real(1.0) - norm, real(0.0))
+
+    @wp.func
     def flowed(F: mat, h: row, e: full) -> row:
         J = determinant(F)
         G = wp.inverse(extended(F)) * (J * root(J) * root(J))
@@ -109,18 +118,19 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
 
     @wp.func
     def moduli(F: mat, h: row, t: real, mu: real, kappa: real) -> pair:
-        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) with x = 2 (e_i − e_j) for shear
+        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) with x = 2 (e_i − e_j) for shear. Of the
+        # stretches over J^(1/3), squared, a bound a ≥ 1 and c ≤ 1 give logarithms: ln a ≤ a − 1, −ln c ≤ 1/c − 1
         J = determinant(F)
         b = bounds(in_space(left_elastic(F, h)))
-        largest = wp.log(b[1])
-        least = b[0]
+        isochoric = root(J) * root(J)
+        largest = b[1] * isochoric
+        least = b[0] * isochoric
         if wp.static(dim == 3):
-            least = wp.max(least, J * J / (b[1] * b[1]))  # the bound may be negative, the determinant is J²
-        least = wp.log(least)
-        spread = largest - least
-        tau = t + mu * (least - real(2.0) / real(3.0) * wp.log(J))
+            least = wp.max(least, real(1.0) / (largest * largest))  # the bound may be negative, the determinant is 1
+        flattened = real(1.0) / least - real(1.0)
+        spread = largest - real(1.0) + flattened
         shear = mu * (real(1.0) + spread)
         M = kappa + real(4.0) / real(3.0) * mu * (real(1.0) + real(0.25) * spread * spread)
-        return pair(wp.max(M - tau, shear), shear)
+        return pair(wp.max(M - t + mu * flattened, shear), shear)
 
-    return Kinematics(trial, flowed, rebased, moduli, in_space)
+    return Kinematics(trial, most, flowed, rebased, moduli, in_space)
