@@ -10,7 +10,7 @@ import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.bench import command, equal_error, many_runs, mixing, release, snapshot_cost
+from warp_eulsph.bench import command, contact_cost, equal_error, many_runs, mixing, release, snapshot_cost
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
 from warp_eulsph.bench.phases import PHASES
@@ -158,6 +158,19 @@ def test_many_runs_together_are_timed_beside_those_one_by_one(monkeypatch, capsy
     finally:
         execution.set_threads(before)
     assert "3 bars of 40 particles, 30 steps each" in capsys.readouterr().out
+
+
+def test_cost_of_contact_is_timed_beside_steps_without(monkeypatch, capsys):
+    monkeypatch.setattr(contact_cost, "ROUNDS", 1)
+    monkeypatch.setattr(contact_cost, "BLOCKS", ((2, 10, 2),))
+    before = execution.threads()
+    try:
+        contact_cost.main()
+    finally:
+        execution.set_threads(before)
+    size, outermost, milliseconds, *shares = re.split(r"\s{2,}", capsys.readouterr().out.splitlines()[1])
+    assert size == "2 x 10^2" and outermost == "36%" and float(milliseconds) > 0.0
+    assert all(float(share.rstrip("%")) < 100.0 for share in shares)
 
 
 def test_runs_beside_the_first_release_still_have_their_error(monkeypatch, capsys):

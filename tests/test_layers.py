@@ -37,7 +37,8 @@ LAYER |= dict.fromkeys(warp_eulsph.__all__, LAYER["validation"])
 MAX_LINES, MAX_KERNEL_LINES = 400, 60
 # What the command line prints is its result
 FRONT_ENDS = {"cli.py"} | {
-    f"bench/{name}.py" for name in ("command", "equal_error", "many_runs", "mixing", "release", "snapshot_cost")
+    f"bench/{name}.py"
+    for name in ("command", "contact_cost", "equal_error", "many_runs", "mixing", "release", "snapshot_cost")
 }
 FRONT_ENDS |= {
     f"validation/{name}.py" for name in ("command", "punch_elements", "step_cost", "balance_sweeps", "coarse", "rods")

@@ -53,6 +53,21 @@ def test_times_that_differ_by_round_off_are_one():
         assert other.due(4 * 3e-4, 1)
 
 
+def test_times_that_steps_cover():
+    """Each time falls to one step, the first that reaches it or ends a hair before; none is aimed at."""
+    for covering in (EveryTime(0.1, exact=False), AtTimes([0.1, 0.2, 0.3], exact=False)):
+        assert covering.next_time(0.0) == math.inf and not covering.due(0.1, 1)
+        assert list(targets(covering, 0.0, 0.35)) == [0.35]
+        ends = [0.0, 0.04, 0.1 - 1e-17, 0.11, 0.2 - 1e-12, 0.29, 0.33]
+        assert [b for a, b in itertools.pairwise(ends) if covering.covered(a, b)] == [ends[2], ends[4], ends[6]]
+        assert all(covering.next_look(t) > t for t in ends[:-1])
+        assert covering.covered(0.05, 0.25)
+    both = AnyOf([EveryTime(0.1, exact=False), EveryTime(0.4), EverySteps(7)])
+    assert both.next_time(0.0) == 0.4 and both.next_look(0.15) == pytest.approx(0.2)
+    assert both.covered(0.15, 0.21) and not both.covered(0.12, 0.18)
+    assert not EveryTime(0.1).covered(0.05, 0.15)
+
+
 def test_the_end_swallows_a_target_a_hair_before_it():
     assert next_target(EveryTime(0.1), 0.25, 0.30000000000000010) == 0.30000000000000010
     assert next_target(EveryTime(0.1), 0.15, 0.3) == 0.2

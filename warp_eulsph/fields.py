@@ -152,10 +152,11 @@ def clock_structure(space: Space) -> Any:
     """Time on the device, so that a recorded step stays valid: arrays of one element.
 
     ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``longest_dt`` [s] the
-    longest of these, ``target`` [s] time that must be hit, ``rate`` [1/s] largest wave speed over spacing, or rate of
-    strain that asks for as short a step, ``frequency`` [1/s] what a condition asks for (``Bound.limit``) and ``added``
-    [1/s²] the sum of all their (½ frequency)², ``bad`` place of the first unphysical particle; of a batch of recorded
-    steps ``running``, 0 when the rest is not to be taken, and ``taken``, steps so far.
+    longest of these, ``target`` [s] time that must be hit, ``look`` [s] time from which on the host looks, ``rate``
+    [1/s] largest wave speed over spacing, or rate of strain that asks for as short a step, ``frequency`` [1/s] what a
+    condition asks for (``Bound.limit``) and ``added`` [1/s²] the sum of all their (½ frequency)², ``bad`` place of the
+    first unphysical particle; of a batch of recorded steps ``running``, 0 when the rest is not to be taken, and
+    ``taken``, steps so far.
     """
 
     @wp.struct
@@ -165,6 +166,7 @@ def clock_structure(space: Space) -> Any:
         free_dt: wp.array(dtype=wp.float64)
         longest_dt: wp.array(dtype=wp.float64)
         target: wp.array(dtype=wp.float64)
+        look: wp.array(dtype=wp.float64)
         rate: wp.array(dtype=space.real)
         frequency: wp.array(dtype=space.real)
         added: wp.array(dtype=wp.float64)

@@ -25,6 +25,14 @@ class Schedule(ABC):
         """The first time [s] after ``t`` that the run must hit exactly; inf if there is none."""
         return math.inf
 
+    def next_look(self, t: float) -> float:
+        """The time [s] after ``t`` at which steps are looked at next, of lengths as they are; inf if there is none."""
+        return math.inf
+
+    def covered(self, before: float, t: float) -> bool:
+        """Whether steps from the time ``before`` to ``t`` [s] reached one that need not be hit exactly."""
+        return self.next_look(before) < self.next_look(t)
+
     def steps_left(self, step: int) -> int | None:
         """Steps from ``step`` to the next one that is due; None if steps do not count."""
         return None
@@ -35,15 +43,17 @@ class Schedule(ABC):
 
 @dataclass(frozen=True)
 class EveryTime(Schedule):
-    """At start + k · interval, hit exactly.
+    """At start + k · interval, hit exactly or by the step that covers it.
 
     Args:
         interval: [s].
         start: [s].
+        exact: steps before a time are shortened to end in it; if not, the first step that reaches it is taken as it is.
     """
 
     interval: float
     start: float = 0.0
+    exact: bool = True
 
     def __post_init__(self) -> None:
         for name in ("interval", "start"):
@@ -57,9 +67,16 @@ class EveryTime(Schedule):
 
     def due(self, t: float, step: int) -> bool:
         k = (t - self.start) / self.interval
-        return math.isfinite(k) and abs(t - self._time(round(k))) <= SAME * self.interval
+        return self.exact and math.isfinite(k) and abs(t - self._time(round(k))) <= SAME * self.interval
 
     def next_time(self, t: float) -> float:
+        return self._next(t) if self.exact else math.inf
+
+    def next_look(self, t: float) -> float:
+        return math.inf if self.exact else _just_before(self._next(t), SAME * self.interval, t)
+
+    def _next(self, t: float) -> float:
+        """The first time [s] after ``t``."""
         k = (t - self.start) / self.interval
         first = max(math.floor(k), 0) if math.isfinite(k) else 0
         for ahead in range(first, first + 4):
@@ -96,13 +113,15 @@ class EverySteps(Schedule):
 
 @dataclass(frozen=True)
 class AtTimes(Schedule):
-    """At given times [s], hit exactly; none by default.
+    """At given times [s], hit exactly or by the steps that cover them; none by default.
 
     Args:
         times: [s], increasing.
+        exact: steps before a time are shortened to end in it; if not, the first step that reaches it is taken as it is.
     """
 
     times: Sequence[float] = ()
+    exact: bool = True
 
     def __post_init__(self) -> None:
         given = real_array(list(self.times) if isinstance(self.times, Iterable) else self.times, "times")
@@ -112,9 +131,17 @@ class AtTimes(Schedule):
         object.__setattr__(self, "times", times)
 
     def due(self, t: float, step: int) -> bool:
-        return any(abs(t - time) <= SAME * abs(time) for time in self.times)
+        return self.exact and any(abs(t - time) <= SAME * abs(time) for time in self.times)
 
     def next_time(self, t: float) -> float:
+        return self._next(t) if self.exact else math.inf
+
+    def next_look(self, t: float) -> float:
+        time = math.inf if self.exact else self._next(t)
+        return time if time == math.inf else _just_before(time, SAME * abs(time), t)
+
+    def _next(self, t: float) -> float:
+        """The first time [s] after ``t``."""
         return next((time for time in self.times if time - t > SAME * abs(time)), math.inf)
 
 
@@ -133,6 +160,12 @@ class AnyOf(Schedule):
     def next_time(self, t: float) -> float:
         return min((schedule.next_time(t) for schedule in self.schedules), default=math.inf)
 
+    def next_look(self, t: float) -> float:
+        return min((schedule.next_look(t) for schedule in self.schedules), default=math.inf)
+
+    def covered(self, before: float, t: float) -> bool:
+        return any(schedule.covered(before, t) for schedule in self.schedules)
+
     def steps_left(self, step: int) -> int | None:
         left = [steps for schedule in self.schedules if (steps := schedule.steps_left(step)) is not None]
         return min(left, default=None)
@@ -140,6 +173,11 @@ class AnyOf(Schedule):
     def check(self, t: float, until: float) -> None:
         for schedule in self.schedules:
             schedule.check(t, until)
+
+
+def _just_before(time: float, hair: float, t: float) -> float:
+    """``time`` less ``hair``, by which it may be missed in round-off, and after ``t`` [s]."""
+    return max(time - hair, math.nextafter(t, math.inf))
 
 
 def next_target(schedule: Schedule, t: float, until: float) -> float:

@@ -20,7 +20,7 @@ from .memory import check_memory
 from .order import Order
 from .overlap import Encounters
 from .progress import Bar
-from .schedule import AtTimes, EveryTime, targets
+from .schedule import AtTimes, EveryTime, Schedule, next_target
 from .scheme.arrangement import Arrangement, Convected
 from .scheme.base import Scheme
 from .scheme.graphs import StepGraphs, recordable
@@ -135,13 +135,21 @@ class Simulation(Looks):
     # what a run does
 
     def run(
-        self, until: float, *, every: float | None = None, output: Any = None, progress: bool | None = None
+        self,
+        until: float,
+        *,
+        every: float | None = None,
+        exact: bool = True,
+        output: Any = None,
+        progress: bool | None = None,
     ) -> None:
         """Step to the time ``until`` [s], which is hit exactly.
 
         Args:
             until: end time [s], not before the present time.
             every: time between frames [s]; the first frame is the present state, the last the end.
+            exact: steps are shortened so that frames are of their times; if not, frames are of the steps that reach
+                these times, and cost no steps.
             output: directory of the run, which can be resumed (``output.record``); what it held moves to ``abandoned/``
                 there. Or an object with ``write(simulation)``, asked once per frame.
             progress: whether a bar is shown; on a terminal and in a notebook if None.
@@ -154,7 +162,7 @@ class Simulation(Looks):
         self.whole.check()
         if not (np.isfinite(real_number(until, "until")) and until >= self.t):
             raise ValueError(f"until must be finite and not before the present time {self.t} s, got {until}")
-        frames = AtTimes() if every is None else EveryTime(every, self.t)
+        frames = AtTimes() if every is None else EveryTime(every, self.t, exact)
         frames.check(self.t, until)
         with Bar(self, until, progress) as self.watch:
             if output is None:
@@ -162,7 +170,7 @@ class Simulation(Looks):
             elif hasattr(output, "write"):
                 self.output = output
                 output.write(self)
-                for _ in self.frames(targets(frames, self.t, until)):
+                for _ in self._looks(frames, until):
                     output.write(self)
             else:
                 from .output import Recording, record
@@ -175,6 +183,13 @@ class Simulation(Looks):
             self._advance(time)
             yield time
 
+    def _looks(self, schedule: Schedule, until: float) -> Iterator[float]:
+        """Step to ``until`` [s], yielding the time when ``schedule`` is due, and at the end."""
+        while self.t < until:
+            target, look = next_target(schedule, self.t, until), schedule.next_look(self.t)
+            self._advance(target, look)
+            yield self.t
+
     def step(self, count: int = 1) -> None:
         """Take ``count`` steps of the scheme's own length, aiming at no time."""
         end = self.steps + whole_number(count, 0, "count of steps")
@@ -182,19 +197,21 @@ class Simulation(Looks):
         while self.steps < end:
             self._take_steps(end - self.steps)
 
-    def advance(self, until: float, most: int | None = None) -> None:
+    def advance(self, until: float, most: int | None = None, look: float = np.inf) -> None:
         """Take the steps between two looks at the clock towards ``until`` [s], at most ``most`` steps.
+
+        None is taken after the one that reaches ``look`` [s], and none is shortened for it.
 
         Raises:
             UnstableError: det F ≤ 0 or non-finite values.
             BrokenError: an exception left an earlier step half done.
         """
-        self.clock.aim(until)
+        self.clock.aim(until, look)
         self._take_steps(most)
 
-    def _advance(self, until: float) -> None:
-        self.clock.aim(until)
-        while self.t < until:
+    def _advance(self, until: float, look: float = np.inf) -> None:
+        self.clock.aim(until, look)
+        while self.t < min(until, look):
             self._take_steps(None)
             if self.watch is not None:
                 self.watch(self)

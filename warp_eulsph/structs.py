@@ -92,6 +92,7 @@ class ClockArrays(Protocol):
     free_dt: wp.array
     longest_dt: wp.array
     target: wp.array
+    look: wp.array
     rate: wp.array
     frequency: wp.array
     added: wp.array

@@ -55,7 +55,7 @@ class Transport:
         self.whole = Whole()
         self.output: Any = None
 
-    def advance(self, until: float, most: int | None = None) -> None:
+    def advance(self, until: float, most: int | None = None, look: float = math.inf) -> None:
         """Take a few steps towards ``until`` [s], at most ``most``; the last one there ends at it exactly.
 
         Raises:
@@ -67,7 +67,7 @@ class Transport:
         before = self.t
         for _ in range(batch if most is None else min(batch, most)):
             left = until - self.t
-            if left <= 0.0:
+            if left <= 0.0 or self.t >= look:
                 break
             # What is left beyond the step by less than SAME of it is rounding, not another step
             last = left <= self.time_step * (1.0 + SAME)

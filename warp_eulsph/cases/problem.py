@@ -32,7 +32,8 @@ class OutputTable(Table):
     fields: list[str] | None
     every: Number | None = Field(None, gt=0.0, description="time between snapshots [s]")
     steps: Whole | None = Field(None, gt=0, description="steps between snapshots")
-    at: list[Number] = Field([], description="more times [s] of snapshots, hit exactly")
+    at: list[Number] = Field([], description="more times [s] of snapshots")
+    exact: bool = Field(True, description="shorten steps to end at these times; else the steps that reach them count")
     precision: Precision = Field("single", description="of the stored numbers")
     region: Zone | None = Field(  # type: ignore[valid-type]
         None, description="particles in the snapshots, by initial positions; all by default"
@@ -56,8 +57,8 @@ class OutputTable(Table):
     @property
     def snapshots(self) -> Schedule:
         """When snapshots are written."""
-        schedules: list[Schedule] = [AtTimes(self.at)]
-        schedules += [EveryTime(self.every)] if self.every is not None else []
+        schedules: list[Schedule] = [AtTimes(self.at, self.exact)]
+        schedules += [EveryTime(self.every, exact=self.exact)] if self.every is not None else []
         schedules += [EverySteps(self.steps)] if self.steps is not None else []
         return AnyOf(schedules)
 

@@ -60,6 +60,10 @@ def make_beside(space: Space) -> wp.Kernel:
 def make_normals(space: Space, fixed: bool) -> wp.Kernel:
     """Kernel: normals of the planes through the outermost particles around.
 
+    S n = λ n of least λ, S = ⟨ξ'⊗ξ'⟩ − ⟨ξ⟩⊗⟨ξ⟩, ξ' from their mean ⟨ξ⟩. Around a corner the mean lies within: without
+    its square moments about it are much alike, and n would swing by a right angle where they cross. On flat faces it
+    lies across n and changes nothing.
+
     And how a normal turns with these: ``answer``, Σ_i e_i ⊗ e_i/(λ_i − λ_n) over the other eigenvectors of their second
     moment, over their weight and spacing.
     """
@@ -86,6 +90,7 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
         wanted: wp.array(dtype=wp.int32),
         normals: wp.array(dtype=vec),
         centres: wp.array(dtype=vec),
+        masses: wp.array(dtype=real),
         normal: wp.array(dtype=vec),
         answer: wp.array(dtype=mat),
     ):
@@ -102,7 +107,7 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
         n = wp.normalize(out)
         if wp.static(dim > 1):
             mass, mean, square = moments_of(a, particles, reference, near, state.x, outward, outermost)
-            axes, spread = eigen(square)
+            axes, spread = eigen(square - wp.outer(mean, mean))
             least, next = order_of(spread)
             if spread[next] > real(SPREAD) and wp.length(out) > real(0.0):
                 for i in range(wp.static(dim)):
@@ -115,7 +120,8 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
                         for j in range(wp.static(dim)):
                             e[j] = axes[j, i]
                         turns += wp.outer(e, e) / ((spread[i] - spread[least]) * mass * particles.spacing[a])
-            centres[a] = mean
+            centres[a] = real(2.0) * mean
+            masses[a] = mass
         normals[a] = n
         normal[k] = n
         answer[k] = turns
@@ -152,7 +158,8 @@ def make_lever(space: Space) -> wp.Kernel:
 def make_turn(space: Space) -> wp.Kernel:
     """Kernel: −∂E/∂n · ∂n/∂x: forces on the particles of a plane whose normal an energy depends on.
 
-    n is an eigenvector of Σ w ξ' ⊗ ξ', ξ' from their mean, so δn = Σ_i e_i (e_i·δ(Σ w ξ' ⊗ ξ') n)/(λ_n − λ_i).
+    n is an eigenvector of S = Σ w ξ⊗ξ/W − 2⟨ξ⟩⊗⟨ξ⟩, so δn = Σ_i e_i (e_i·δS n)/(λ_n − λ_i); ``centres`` are 2⟨ξ⟩,
+    ``masses`` W. All ξ are from the particle whose plane it is, so that it takes what the others got.
     """
     vec, real, separation = space.vec, space.real, difference(space)
     weight_of, alike = surface_weight(space)[0], alike_vectors(space)
@@ -177,17 +184,18 @@ def make_turn(space: Space) -> wp.Kernel:
         beside: wp.array(dtype=wp.int32),
         normals: wp.array(dtype=vec),
         centres: wp.array(dtype=vec),
+        masses: wp.array(dtype=real),
         levers: wp.array(dtype=vec),
         out: wp.array(dtype=vec),
     ):
         k = first + wp.tid()
         if beside[k] == 1:
             c = members[k] - offset
-            xi = -centres[c]
             force = vec()
-            if wanted[c] == 1:
+            if wanted[c] == 1:  # less what its move does to all others of its plane
                 w = weight_of(real(0.0), real(REACH) * particles.spacing[c])
-                force = w * (levers[c] * wp.dot(normals[c], xi) + normals[c] * wp.dot(levers[c], xi))
+                xi = centres[c] * (real(0.5) * masses[c] - w)
+                force = levers[c] * wp.dot(normals[c], xi) + normals[c] * wp.dot(levers[c], xi)
             for i in range(near.start[c], near.start[c + 1]):
                 a = near.index[i]
                 if wanted[a] == 1 and alike(outward[a], outward[c]):

@@ -43,6 +43,7 @@ class _Layer:
         self.changes = self.outward is not medium.particles.outward and not flowing.all()
         self.least = 0.0 if exact else LARGE
         self._normals, self._centres, self._levers = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
+        self._masses = wp.zeros(n, dtype=space.real, device=device)
         self.wanted = wp.zeros(n, dtype=wp.int32, device=device)
 
     def find(self) -> None:
@@ -63,7 +64,7 @@ class _Layer:
     def normals(self, places: wp.array, state: StateArrays, normal: wp.array, answer: wp.array) -> None:
         """Which way out is of those at ``places``, by where the particles of ``state`` are."""
         arguments = [*self._of(places), self.medium.of(state), self.outward, self.outermost, self.wanted]
-        arguments += [self._normals, self._centres, normal, answer]
+        arguments += [self._normals, self._centres, self._masses, normal, answer]
         kernel = make_normals(self.space, self.medium.configuration.fixed)
         self._launch(kernel, len(places), arguments)
 
@@ -82,7 +83,7 @@ class _Layer:
         arguments = [places, self.medium.span.start, self.wanted, answer, slope, self._levers]
         self._launch(make_lever(self.space), len(places), arguments)
         arguments = [*self._of(places), self.medium.of(state), self.outward, self.wanted, beside]
-        arguments += [self._normals, self._centres, self._levers, out]
+        arguments += [self._normals, self._centres, self._masses, self._levers, out]
         self._launch(make_turn(self.space), len(places), arguments)
 
     def _of(self, places: wp.array) -> list[Any]:

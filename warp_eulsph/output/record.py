@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..schedule import next_target
+from ..schedule import Schedule, next_target
 from ..scheme.health import UnstableError
 from ..settling import check_damped
 from .atomic import replace_file
@@ -203,6 +203,11 @@ def _compare(checkpoint: Checkpoint, simulation: Recorded, description: Mapping[
         log.warning("resuming elsewhere, so the bits may differ: %s", change)
 
 
+def _is_due(schedule: Schedule, before: float, t: float, step: int) -> bool:
+    """Whether something is due at time ``t`` [s] after ``step`` steps, the last look having been ``before``."""
+    return schedule.due(t, step) or schedule.covered(before, t)
+
+
 class _Recorder:
     """Writes what is due, in the background."""
 
@@ -227,6 +232,7 @@ class _Recorder:
         self.description, self.environment = description, environment(simulation)
         self.lines: list[dict[str, Any]] = []
         self.coming: Frame | None = None  # on its way from the device
+        self.looked = simulation.t  # when it was last looked what is due; checkpoints are taken after a look
         self.worker = Worker()
         self.flushed = self.checked = time.monotonic()
 
@@ -279,21 +285,22 @@ class _Recorder:
     def _advance(self, until: float) -> None:
         simulation, schedule = self.simulation, self.schedule
         target = next_target(schedule, simulation.t, until)
-        simulation.advance(target, schedule.steps_left(simulation.steps))
+        simulation.advance(target, schedule.steps_left(simulation.steps), schedule.next_look(simulation.t))
 
     def keep(self, everything: bool) -> None:
         """Queue what is due now, or everything."""
         simulation, recording = self.simulation, self.recording
         t, step, now = simulation.t, simulation.steps, time.monotonic()
+        before, self.looked = self.looked, t
         self._forward()
-        if everything or recording.snapshots.due(t, step):
+        if everything or _is_due(recording.snapshots, before, t, step):
             self.coming = self.snapshots.collect(simulation)
             if not self.coming.on_its_way:
                 self._forward()
-        if everything or recording.log.due(t, step):
+        if everything or _is_due(recording.log, before, t, step):
             self.lines.append(look(simulation))
         for probe, measure, table in self.probes:
-            if everything or probe.schedule.due(t, step):
+            if everything or _is_due(probe.schedule, before, t, step):
                 table.add(step, t, measure())
         if now - self.checked > recording.checkpoint:
             self.checkpoint()

@@ -1,5 +1,6 @@
 """What output asks of a run: protocols that ``Simulation`` and ``Transport`` fulfil, so that it knows neither."""
 
+import math
 from collections.abc import Mapping
 from typing import Any, Protocol, TypeGuard
 
@@ -70,8 +71,8 @@ class Recorded(Protocol):
     def restore(self, arrays: Mapping[str, np.ndarray], counters: Mapping[str, float]) -> None:
         """Take over what ``evolving`` and ``counters`` were."""
 
-    def advance(self, until: float, most: int | None = None) -> None:
-        """Take a few steps towards ``until`` [s]."""
+    def advance(self, until: float, most: int | None = None, look: float = math.inf) -> None:
+        """Take a few steps towards ``until`` [s], not beyond the one that reaches ``look`` [s]."""
 
 
 class RecordedSolids(Recorded, Protocol):

@@ -303,6 +303,8 @@ class Medium:
     def stress(self, state: StateArrays, fraction: float) -> None:
         """Q of F (M1), which is ``fraction`` · Δt ahead of the histories."""
         self.flux.compute(self.of(state).F, self.grad_v, self.configuration, self.clock, fraction)
+        self.stabiliser.exact(self.walls.without(self.of(state).v, self.grad_v, self.sums.grad_v))
+        self.stabiliser.turn(self.sums, self.clock, fraction)
 
     def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 import warp as wp
 
 from ..space import Space
-from ..structs import FluxArrays, ForceArrays, ParticleArrays, StateArrays
+from ..structs import ClockArrays, FluxArrays, ForceArrays, ParticleArrays, StateArrays
 from .flux import Flux
 from .potentials import Potentials
 from .reference import Configuration
@@ -70,6 +70,10 @@ class Stabiliser(ABC):
     def exact(self, gradient: wp.array) -> wp.array:
         """Gradients that are exact for linear fields from those of the reference, by which M9 and M24 reconstruct."""
         return gradient
+
+    def turn(self, sums: Sums, clock: ClockArrays, fraction: float) -> None:
+        """Turn Q with the material, to where it is after ``fraction`` · Δt; where gradients are exact it has turned."""
+        return
 
     def evolving(self) -> dict[str, wp.array]:
         """Arrays by name that live from step to step: what a checkpoint must hold."""

@@ -86,7 +86,7 @@ def _make_tick(space: Space) -> wp.Kernel:
             else:
                 clock.t[0] = clock.t[0] + clock.dt[0]
         clock.taken[0] = clock.taken[0] + 1
-        if clock.bad[0] != WELL or clock.t[0] >= clock.target[0]:
+        if clock.bad[0] != WELL or clock.t[0] >= wp.min(clock.target[0], clock.look[0]):
             clock.running[0] = 0
 
     return tick
@@ -128,8 +128,9 @@ class DeviceClock:
         self._launch = Launcher(device)
         self.cfl = cfl if option.cfl is None else option.cfl
         self.fields: ClockArrays = clock_structure(space)()
-        for name in ("t", "dt", "free_dt", "longest_dt", "target", "added"):
+        for name in ("t", "dt", "free_dt", "longest_dt", "target", "look", "added"):
             setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
+        self.fields.look.fill_(math.inf)
         self.fields.rate, self.fields.frequency = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))
         self.fields.bad = wp.full(1, WELL, dtype=wp.int32, device=device)
         self.fields.running, self.fields.taken = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
@@ -158,9 +159,10 @@ class DeviceClock:
         """Longest time step [s] so far that no output time shortened; reads the device."""
         return float(self.fields.longest_dt.numpy()[0])
 
-    def aim(self, target: float) -> None:
-        """Set the time [s] that must be hit next."""
+    def aim(self, target: float, look: float = math.inf) -> None:
+        """Set the time [s] that must be hit next, and that from which on the host looks, which shortens no step."""
         self.fields.target.fill_(target)
+        self.fields.look.fill_(look)
 
     def open_batch(self) -> None:
         """Begin a batch of recorded steps, of which none is taken once the target is reached or a particle is bad."""

@@ -6,15 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
-from ..structs import ParticleArrays, StateArrays
+from ..structs import ClockArrays, ParticleArrays, StateArrays
 from ..weights import Weight
 from .dissipation import UpwindForces
 from .flux import Flux
 from .potentials import Potentials
 from .reference import Configuration
-from .stabiliser import Correction
+from .stabiliser import Correction, Sums
 
 # Spacings from which a weight is summed over a lattice.
 FAR = 8
@@ -91,6 +92,33 @@ def _make_mend(space: Space, components: int) -> wp.Kernel:
     return mend
 
 
+@functools.cache
+def _make_turn(space: Space) -> wp.Kernel:
+    """Kernel: the spin by which Q has turned in the time that it is ahead becomes that of the exact gradient."""
+    mat, real, dim = space.mat, space.real, space.dim
+    Flux, Reference, Clock = structure(space, "Flux"), structure(space, "Reference"), clock_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def turn(
+        first: int,
+        exact: wp.array(dtype=mat),
+        clock: Clock,
+        fraction: wp.float64,
+        reference: Reference,
+        dual: bool,
+        flux: Flux,
+    ):
+        a = first + wp.tid()
+        Q = flux.Q[a]
+        spin = (exact[a] - wp.transpose(exact[a])) * real(wp.float64(0.5) * fraction * clock.dt[0])
+        Q = (Q + wp.transpose(Q)) * real(0.5) + spin * (wp.trace(Q) / real(dim))
+        flux.Q[a] = Q
+        if dual:
+            flux.Pi[a] = Q @ wp.transpose(reference.L[a])
+
+    return turn
+
+
 class UncorrectedForces(UpwindForces):
     """M9 and M27 at work: it takes L out of the reference.
 
@@ -129,6 +157,12 @@ class UncorrectedForces(UpwindForces):
             "Uncorrected.of_pairs": self._of_pairs,
             "Uncorrected.kappa": self.kappa,
         }
+
+    def turn(self, sums: Sums, clock: ClockArrays, fraction: float) -> None:
+        """Pairs turn by the exact gradient, and pressure on them with them: else it has a moment."""
+        dual = len(sums.flux.Pi) > 0
+        arguments = [sums.grad_v, clock, fraction, sums.configuration.fields, dual, sums.flux]
+        self._launch(_make_turn(self.space), len(self.kappa), arguments)
 
     def exact(self, gradient: wp.array) -> wp.array:
         """Exact gradients from those of the reference; of velocities in an array of its own, of others in place."""
