@@ -10,7 +10,7 @@ import pytest
 import warp as wp
 
 from warp_eulsph import execution
-from warp_eulsph.bench import command, contact_cost, equal_error, many_runs, mixing, release, snapshot_cost
+from warp_eulsph.bench import command, contact_cost, equal_error, many_runs, mixing, passes, release, snapshot_cost
 from warp_eulsph.bench.cases import CASES, MODES
 from warp_eulsph.bench.machine import arithmetic, bandwidth
 from warp_eulsph.bench.phases import PHASES
@@ -184,3 +184,21 @@ def test_runs_beside_the_first_release_still_have_their_error(monkeypatch, capsy
     then, recorded, here = (line.split("|") for line in capsys.readouterr().out.splitlines()[2:])
     assert max(float(row[4]) for row in (then, recorded, here)) < 0.0501
     assert float(here[4]) == pytest.approx(float(recorded[4]), rel=0.02)
+
+
+@pytest.mark.of_the_cpu
+def test_kernels_of_a_step_are_timed(monkeypatch):
+    """A total Lagrangian step makes five sums over neighbours; their times and those of the rest make up the step's."""
+    monkeypatch.setattr(passes, "SECONDS_PER_ROUND", 0.05)
+    case = next(case for case in CASES if case.name == "total-2d-float64")
+    threads = execution.threads()
+    try:
+        lines = passes.table(dataclasses.replace(case, side=40), rounds=2).splitlines()
+    finally:
+        execution.set_threads(threads)
+    sums = {line.split()[0] for line in lines if line.endswith("per pair")}
+    assert len(sums) == 5 and "sharpening.sharpen" in sums and "updates.kick" not in sums
+    listed = [float(line.split()[1]) for line in lines[1:]]
+    assert listed == sorted(listed, reverse=True)
+    assert sum(listed) == pytest.approx(float(lines[0].split()[1]), rel=0.2)  # those below LEAST are not listed
+    assert passes.main(["no such"]) == 2

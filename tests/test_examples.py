@@ -113,6 +113,13 @@ def test_colliding_rings(run):
     assert figures["velocity of the left one, end / start"] < -0.3
 
 
+def test_container(run):
+    figures, frames = run("container", "--speed", "300", "--film")
+    assert frames == 10
+    assert 0.8 < figures["momentum that the wall took / start"] < 1.1
+    assert figures["momentum that is missing / start"] < 1e-12
+
+
 def test_failed_check_ends_the_example(run):
     """Six particles along the block's side are too few for the reaction at 15 ms."""
     with pytest.raises(SystemExit, match=r"outside the accepted band: .*'reaction at 15 ms"):
@@ -129,6 +136,8 @@ def test_failed_check_ends_the_example(run):
         ("twisting_column", (2, es.Always())),
         ("punch", (6, es.Always())),
         ("taylor_bar", (3, es.Always(), es.Current())),
+        ("container", (20, 200.0)),
+        ("container", (20, 200.0, 3)),
     ],
 )
 def test_set_up_is_shown_and_is_the_one_that_is_validated(name, arguments, monkeypatch):

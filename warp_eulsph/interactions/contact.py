@@ -196,8 +196,9 @@ class BoundContact(BoundInteraction):
         self.nearby.forget()
 
     def prepare(self, world: "World") -> None:
-        """What is outermost now, where the arrangement is read anew and particles have moved, and what is near it."""
+        """What is outermost now, where the arrangement is read anew or a crack grew, and what is near it."""
         U, clock = world.U, world.clock
+        self.skin.tell(self._found.stale)
         if self.skin.changes and self._found(U, clock.fields):
             self.skin.find()
             self._found.note(U.x)
@@ -206,6 +207,7 @@ class BoundContact(BoundInteraction):
 
     def check(self, world: "World", running: wp.array) -> None:
         if self.skin.changes:
+            self.skin.tell(self._found.stale)
             self._found.check(world.U, world.clock.fields, 0.0, running)
         self.nearby.moved.check(world.U, world.clock.fields, world.clock.option.growth, running)
 

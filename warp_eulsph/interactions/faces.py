@@ -226,7 +226,7 @@ def plane_moments(space: Space) -> wp.Function:
 def make_area(space: Space) -> wp.Kernel:
     """Kernel: the face of each outermost particle, 1/Σ_b φ_ab over those of its face, and how far these are from flat.
 
-    What was outermost before keeps both: energies that depend on them must not jump.
+    What was outermost before keeps both: energies that depend on them must not jump. Those ``alone`` are outermost too.
     """
     vec, real, dim, weight_of = space.vec, space.real, space.dim, surface_weight(space)[0]
     moments_of, eigen, order_of = plane_moments(space), symmetric_eigen(space), least_two(space)
@@ -246,14 +246,16 @@ def make_area(space: Space) -> wp.Kernel:
         near: Neighbours,
         outward: wp.array(dtype=vec),
         outermost: wp.array(dtype=wp.int32),
+        alone: wp.array(dtype=wp.int32),
         there: wp.array(dtype=wp.int32),
         area: wp.array(dtype=real),
         bend: wp.array(dtype=real),
     ):
         k = first + wp.tid()
         a = members[k] - offset
-        known = there[k] == 1 and outermost[a] == 1
-        there[k] = outermost[a]
+        now = wp.max(outermost[a], alone[a])
+        known = there[k] == 1 and now == 1
+        there[k] = now
         if known:
             return
         total = weight_of(real(0.0), real(REACH) * particles.spacing[a])
@@ -266,7 +268,7 @@ def make_area(space: Space) -> wp.Kernel:
             if spread[next] > real(SPREAD):
                 uneven = wp.clamp(spread[least] / spread[next], real(0.0), real(1.0))
         area[k] = real(1.0) / total
-        if wp.length_sq(outward[a]) == real(0.0):  # nobody knows beside whom
+        if alone[a] == 1 or wp.length_sq(outward[a]) == real(0.0):  # nobody knows beside whom
             area[k] = wp.pow(particles.V0[a], real(wp.static(1.0 - 1.0 / dim)))
         bend[k] = uneven
 

@@ -90,6 +90,7 @@ class Moved:
 
     Attributes:
         at: where they were then [m], (k,) of vec.
+        stale: 1 where it is to be found anew in any case, (1,) int32.
     """
 
     def __init__(self, space: Space, places: wp.array, allowed: float):
@@ -97,17 +98,17 @@ class Moved:
         self._launch = Launcher(device)
         self.at = wp.zeros(len(places), dtype=space.vec, device=device)
         self._ends = wp.full(2 * space.dim, -float("inf"), dtype=space.real, device=device)
-        self._stale = wp.full(1, 1, dtype=wp.int32, device=device)
+        self.stale = wp.full(1, 1, dtype=wp.int32, device=device)
         self._far, self._nobody = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
 
     def forget(self) -> None:
         """Have it found anew in any case."""
-        self._stale.fill_(1)
+        self.stale.fill_(1)
 
     def note(self, x: wp.array) -> None:
         """It was found where particles are at ``x`` [m], (n,) of vec by place."""
         self._launch(_make_note(self.space), len(self.at), [self.places, x, self.at])
-        self._stale.zero_()
+        self.stale.zero_()
         self._far.zero_()
 
     def check(self, state: StateArrays, clock: ClockArrays, ahead: float, running: wp.array) -> None:
@@ -121,7 +122,7 @@ class Moved:
         """
         arguments = [self.places, state.x, state.v, clock, ahead, self.at, self._ends]
         self._launch(_make_spread(self.space), len(self.at), arguments)
-        arguments = [self._ends, self.allowed, self._stale, self._far, running]
+        arguments = [self._ends, self.allowed, self.stale, self._far, running]
         self._launch.once(_make_decide(self.space), 1, arguments)
 
     def __call__(self, state: StateArrays, clock: ClockArrays, ahead: float = 0.0) -> bool:

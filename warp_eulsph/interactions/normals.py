@@ -65,7 +65,7 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
     lies across n and changes nothing.
 
     And how a normal turns with these: ``answer``, Σ_i e_i ⊗ e_i/(λ_i − λ_n) over the other eigenvectors of their second
-    moment, over their weight and spacing.
+    moment, over their weight and spacing. Those ``alone`` have none.
     """
     vec, mat, real, dim, cof, invert = space.vec, space.mat, space.real, space.dim, cofactor(space), inverse(space)
     moments_of, eigen, order_of = plane_moments(space), symmetric_eigen(space, SWEEPS[dim]), least_two(space)
@@ -87,6 +87,7 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
         state: State,
         outward: wp.array(dtype=vec),
         outermost: wp.array(dtype=wp.int32),
+        alone: wp.array(dtype=wp.int32),
         wanted: wp.array(dtype=wp.int32),
         normals: wp.array(dtype=vec),
         centres: wp.array(dtype=vec),
@@ -122,6 +123,9 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
                         turns += wp.outer(e, e) / ((spread[i] - spread[least]) * mass * particles.spacing[a])
             centres[a] = real(2.0) * mean
             masses[a] = mass
+        if alone[a] == 1:
+            n = vec()
+            turns = mat()
         normals[a] = n
         normal[k] = n
         answer[k] = turns

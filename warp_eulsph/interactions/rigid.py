@@ -114,10 +114,10 @@ class BoundRigidBody(BoundInteraction):
         order, who = self.assembly.order, f"rigid body {self.option.name!r}"
         moduli = np.array([both for medium in world.media for both in medium.flux.moduli()])
         laws = [part.law for _, part in world.remembering]
-        flowing = np.array([law.update is not None and not law.history for law in laws])
+        loose = np.array([law.failed is not None or (law.update is not None and not law.history) for law in laws])
         body = order.by_number(world.particles.body.numpy())
         self._refuse_overlap(world, who)
-        traces = find_traces(self.assembly, world.U, self.indices, flowing[body], who)
+        traces = find_traces(self.assembly, world.U, self.indices, loose[body], who)
         mass, spacing = (
             order.by_number(a.numpy()).astype(float) for a in (world.particles.mass, world.particles.spacing)
         )

@@ -24,7 +24,8 @@ class _Layer:
 
     Attributes:
         outermost: of all its particles, (n,) int32. outward: which way out is, (n,) of vec; zero in liquids.
-        changes: whether other particles may become outermost.
+        alone: which of them have no normal, (n,) int32: those that flow, and those beside a crack.
+        changes: whether other particles may become outermost. breaking: what cracks it, if anything does.
     """
 
     def __init__(self, space: Space, medium: "Medium", device: Any):
@@ -40,7 +41,10 @@ class _Layer:
         self.outward = medium.particles.outward
         if not fixed and (flowing.any() or not exact):
             self.outward = wp.zeros(n, dtype=space.vec, device=device)
-        self.changes = self.outward is not medium.particles.outward and not flowing.all()
+        self.breaking = medium.breaking if fixed else None
+        self.alone = self._flowing if self.breaking is None else self.breaking.frayed
+        self.changes = self.breaking is not None
+        self.changes |= self.outward is not medium.particles.outward and not flowing.all()
         self.least = 0.0 if exact else LARGE
         self._normals, self._centres, self._levers = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
         self._masses = wp.zeros(n, dtype=space.real, device=device)
@@ -49,7 +53,7 @@ class _Layer:
     def find(self) -> None:
         """Which are outermost in the present reference."""
         configuration, n = self.medium.configuration, self.medium.n
-        if self.changes:
+        if self.outward is not self.medium.particles.outward:
             arguments = [configuration.fields, configuration.near, self._flowing, self.outward]
             self._launch(make_outward(self.space), n, arguments)
         arguments = [self.medium.particles, configuration.fields, configuration.near, configuration.poor]
@@ -58,13 +62,13 @@ class _Layer:
 
     def areas(self, places: wp.array, there: wp.array, area: wp.array, bend: wp.array) -> None:
         """The face of each of its particles at ``places``, whether it is outermost, and how flat it lies."""
-        arguments = [*self._of(places), self.outward, self.outermost, there, area, bend]
+        arguments = [*self._of(places), self.outward, self.outermost, self.alone, there, area, bend]
         self._launch(make_area(self.space), len(places), arguments)
 
     def normals(self, places: wp.array, state: StateArrays, normal: wp.array, answer: wp.array) -> None:
         """Which way out is of those at ``places``, by where the particles of ``state`` are."""
-        arguments = [*self._of(places), self.medium.of(state), self.outward, self.outermost, self.wanted]
-        arguments += [self._normals, self._centres, self._masses, normal, answer]
+        arguments = [*self._of(places), self.medium.of(state), self.outward, self.outermost]
+        arguments += [self.alone, self.wanted, self._normals, self._centres, self._masses, normal, answer]
         kernel = make_normals(self.space, self.medium.configuration.fixed)
         self._launch(kernel, len(places), arguments)
 
@@ -95,8 +99,9 @@ class Skin:
     """The outermost particles of bodies, in gathers that are the same on any number of threads.
 
     Where the arrangement stays that of the start, its outermost particles stay outermost, and the skin has them alone;
-    where it is read anew, every particle may be, and ``there`` says which are. Particles of liquids change places all
-    the time: all of them are, and have no normal. An outermost particle lies half a
+    where it is read anew, or breaks, every particle may be, and ``there`` says which are. Particles of liquids change
+    places all the time: all of them are, and have no normal. So are those that lost a neighbour to a crack: no plane
+    says where their surface is. An outermost particle lies half a
     spacing beneath the surface; bodies are at least two particles thick.
 
     Args:
@@ -170,6 +175,12 @@ class Skin:
     def changes(self) -> bool:
         """Whether other particles may become outermost."""
         return any(layer.changes for layer in self._layers)
+
+    def tell(self, stale: wp.array) -> None:
+        """Set ``stale``, (1,) int32, to 1 if a crack grew in the last step; launches only."""
+        for layer in self._layers:
+            if layer.breaking is not None:
+                layer.breaking.tell(stale)
 
     def find_layers(self) -> None:
         """Which particles of the media are outermost."""

@@ -64,6 +64,7 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
         near: Neighbours,
         cut: wp.array(dtype=wp.int32),
         fresh: wp.array(dtype=wp.int32),
+        frayed: wp.array(dtype=wp.int32),
     ):
         if fresh[0] == wp.static(WELL):
             return
@@ -83,6 +84,7 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
             moment += xi * near.own[k]
             K += wp.outer(xi, xi) * near.own[k]
         if lost > 0:
+            frayed[a] = 1
             reference.L[a] = invert(K)
             reference.diagonal[a] = diagonal
             if wp.static(tilted):
@@ -93,11 +95,18 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
     return cut_pairs
 
 
+@wp.kernel(module="unique", enable_backward=False)
+def _tell(fresh: wp.array(dtype=wp.int32), grew: wp.array(dtype=wp.int32)):
+    if fresh[0] != wp.static(WELL):
+        grew[0] = 1
+
+
 class Breaking:
     """At work on a medium one of whose laws has ``failed``.
 
     Attributes:
         first: place of the first particle that has failed, of one element.
+        cut, frayed: which are let go, and which lost a neighbour by that, (n,) int32; empty where arrangements move.
     """
 
     def __init__(self, space: Space, flux: Flux, configuration: Configuration, device: wp.DeviceLike):
@@ -109,6 +118,7 @@ class Breaking:
             )
         n = len(configuration.poor)
         self.cut = wp.zeros(n if configuration.fixed else 0, dtype=wp.int32, device=device)
+        self.frayed = wp.zeros_like(self.cut)
         self.first, self._fresh = (wp.full(1, WELL, dtype=wp.int32, device=device) for _ in range(2))
 
     def evolving(self) -> dict[str, wp.array]:
@@ -125,13 +135,18 @@ class Breaking:
                 self._launch(kernel, part.size, arguments, part.first)
         self._cut()
 
+    def tell(self, grew: wp.array) -> None:
+        """Set ``grew``, (1,) int32, to 1 if particles were cut off in the last update; launches only."""
+        self._launch.once(_tell, 1, [self._fresh, grew])
+
     def rebuild(self) -> None:
         """Cut off again what was, after weights were made anew."""
         self._fresh.zero_()
+        self.frayed.zero_()
         self._cut()
 
     def _cut(self) -> None:
         if len(self.cut):
             fields, near = self.configuration.fields, self.configuration.near
-            arguments = [self.flux.particles, fields, near, self.cut, self._fresh]
+            arguments = [self.flux.particles, fields, near, self.cut, self._fresh, self.frayed]
             self._launch(_make_cut(self.space, self.configuration.tilt is not None), len(self.cut), arguments)
