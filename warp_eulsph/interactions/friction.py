@@ -51,7 +51,7 @@ def make_slip(space: Space) -> wp.Kernel:
             if how[4] > real(0.0) and how[0] < how[1]:
                 stiff = stiffness_of(skin, k, m)
                 weight = how[4] * weight_of(how[2], how[3])
-                p = weight * stiff[0] * how[1] * pressure_of(how[0], how[1])[0]
+                p = weight * stiff[0] * how[1] * wp.max(pressure_of(how[0], how[1])[0], real(0.0))
                 pressed += p
                 shear += weight * stiff[1]
                 motion += p * (v[b] - v[a])

@@ -74,7 +74,11 @@ def facing(space: Space) -> wp.Function:
 
 @functools.cache
 def pressure(space: Space) -> wp.Function:
-    """``wp.func`` (r, r0) -> row (p, ∫_r^{r0} p dr) over K: p = ln(r0/r), from r0/4 down along its tangent."""
+    """``wp.func`` (r, r0) -> row (p, ∫_r^{r0} p dr) over K: p = ln(r0/r), from r0/4 down along its tangent.
+
+    What was shot through, r < 0, is behind at −r0 and feels nothing there: the energy fades until then by a cubic step,
+    or it would be made of nothing.
+    """
     real, pair = space.real, space.row(2)
 
     @wp.func
@@ -87,7 +91,13 @@ def pressure(space: Space) -> wp.Function:
         stored = r0 - s - s * p
         further = s - r
         stored += further * (p + real(0.5) * further / least)
-        return pair(p + further / least, stored)
+        p += further / least
+        passed = -r / r0
+        if passed > real(0.0):
+            left = wp.max(real(1.0) - passed, real(0.0))
+            p = left * (left * (real(1.0) + real(2.0) * passed) * p - real(6.0) * passed * stored / r0)
+            stored *= left * left * (real(1.0) + real(2.0) * passed)
+        return pair(p, stored)
 
     return pressure
 
@@ -218,7 +228,7 @@ def make_push(space: Space, rubs: bool) -> wp.Kernel:
                 if wp.static(rubs):
                     u = (slip[lower] - slip[upper]) * real(0.5) + (v[b] - v[a]) * real(fraction * clock.dt[0])
                     u = u - n * wp.dot(n, u)
-                    most = friction * K * p[0]
+                    most = friction * K * wp.max(p[0], real(0.0))
                     if stiff[1] * wp.length(u) > most:
                         u = wp.normalize(u) * (most / stiff[1])
                     pushed -= u * (weight * stiff[1])
