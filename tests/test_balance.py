@@ -10,7 +10,7 @@ from bodies import RUBBER
 
 import warp_eulsph as es
 from warp_eulsph.geometry import box
-from warp_eulsph.scheme.balance import RELAXATION, _make_relax
+from warp_eulsph.scheme.potentials import RELAXATION, _make_relax
 from warp_eulsph.validation.balance_sweeps import left_over, spectrum
 from warp_eulsph.validation.cases import bending_column, piston, punch
 

@@ -9,13 +9,14 @@ import pytest
 
 import warp_eulsph as es
 from warp_eulsph import execution, simulation, sorting, transport
+from warp_eulsph.defaults import COMMON, LIQUID
 from warp_eulsph.geometry import surface
 from warp_eulsph.output import checkpoint
-from warp_eulsph.scheme import flux, lax, shifting, time_step
+from warp_eulsph.scheme import exposure, flux, lax, time_step
 
 DOCS = Path(__file__).parents[1] / "docs"
 WORDS = {2: "two", 3: "three", Fraction(1, 2): "½", Fraction(1, 10): "a tenth", 100: "a hundred"}
-BOUND, NEAR = (Fraction(x).limit_denominator(1000) for x in (es.Shifting().bound, shifting.NEAR_SURFACE))
+BOUND = Fraction(es.Shifting().bound).limit_denominator(1000)
 
 
 def word(number):
@@ -27,7 +28,8 @@ def default(function, name):
 
 
 FIGURES = [
-    ("method.md", f"**Default: cubic spline, dilation {default(es.Simulation, 'dilation'):g}**"),
+    ("method.md", f"**Default: cubic spline, dilation {COMMON.dilation:g}**"),
+    ("howto/fluids.md", f"`{LIQUID.weight!r}`, {LIQUID.dilation:g} |"),
     ("method.md", f"**Default: CFL {es.Verlet.cfl:g} for Verlet, {es.LaxWendroff.cfl:g} for the others.**"),
     ("method.md", f"|∇v| Δt is at most CFL/{1.0 / flux.STRAIN:g}"),
     ("method.md", f"**Default: ε = {es.Verlet().dissipation.epsilon:g}, no sensor.**"),
@@ -36,7 +38,7 @@ FIGURES = [
     ("method.md", f"**Default: `Balance(sweeps={es.Balance().sweeps}, bound={es.Balance().bound:g})`**"),
     ("method.md", f"`Shifting(rate={es.Shifting().rate:g}, bound={es.Shifting().bound:g})`"),
     ("method.md", f"at most {BOUND} spacing;"),
-    ("method.md", f"(|s_a| above {NEAR}"),
+    ("method.md", f"the threshold is {exposure.EXPOSED:g}"),
     ("performance.md", f"{simulation.STEPS_BETWEEN_LOOKS} of them between two looks of the host"),
     ("performance.md", f"the default below {2 * execution.LEAST_RANGE} particles"),
     ("performance.md", f"the reference moves every {sorting.STEPS_BETWEEN_SORTS} steps"),
@@ -60,8 +62,8 @@ def test_figures_that_the_pages_have_once_for_several():
     assert lax.Lax.cfl == es.LaxWendroff.cfl
     assert es.Verlet().dissipation.sensor is es.LaxWendroff().dissipation.sensor is None
     assert es.Verlet().limiter is es.LaxWendroff().limiter is None
-    assert isinstance(default(es.Simulation, "weight"), es.CubicSpline) and sorting.MUCH_MORE == 2.0
-    assert isinstance(default(es.Simulation, "scheme"), es.Verlet)
+    assert es.CubicSpline() == COMMON.weight and sorting.MUCH_MORE == 2.0
+    assert es.Verlet() == COMMON.scheme
     text = inspect.getdoc(time_step.TimeStep)
     assert f"{es.Verlet.cfl:g} for Verlet and {es.LaxWendroff.cfl:g} for the others" in text
     assert f"CFL/{1.0 / flux.STRAIN:g}" in text

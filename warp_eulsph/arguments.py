@@ -29,10 +29,13 @@ def check_options(
     checked_dtype(dtype)
     instance(reference, ReferencePolicy, "reference", "Always()")
     instance(arrangement, Arrangement, "arrangement", "Convected()")
-    instance(scheme, Scheme, "scheme", "Verlet()")
+    if scheme is not None:
+        instance(scheme, Scheme, "scheme", "Verlet()")
     instance(time_step, TimeStep, "time_step", "TimeStep(cfl=0.7)")
-    instance(weight, Weight, "weight", "CubicSpline()")
-    positive(dilation, "dilation", "1.3 is the tested value")
+    if weight is not None:
+        instance(weight, Weight, "weight", "CubicSpline()")
+    if dilation is not None:
+        positive(dilation, "dilation", "1.3 is the tested value")
 
 
 def checked_dtype(given: Any) -> Any:

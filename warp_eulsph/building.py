@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 
 from .body import Body, groups_of
+from .defaults import suited
 from .failure import place_of
 from .fields import allocate, part
 from .scheme.arrangement import Arrangement
@@ -30,6 +31,16 @@ class Options(NamedTuple):
     scheme: Scheme
     weight: Weight
     dilation: float
+
+
+class Given(NamedTuple):
+    """Options of a simulation; None is what suits the matter of each body (``defaults.py``)."""
+
+    reference: ReferencePolicy
+    arrangement: Arrangement
+    scheme: Scheme | None
+    weight: Weight | None
+    dilation: float | None
 
 
 @dataclass(frozen=True)
@@ -81,20 +92,21 @@ class MediumPlan:
         return MediumParts(scheme, policy, self.span, own, flux, configuration, given, groups_of(self.bodies))
 
 
-def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
+def plan_media(bodies: Sequence[Body], defaults: Given) -> list[MediumPlan]:
     """The media of these bodies, in their order.
 
     Raises:
         ValueError: options that do not suit a material, or schemes of different kinds.
     """
     ranges = ranges_of(bodies)
+    kind = type(options_of(bodies[0], defaults).scheme if defaults.scheme is None else defaults.scheme)
     media: list[MediumPlan] = []
     for body in bodies:
         options = options_of(body, defaults)
         check_reference([body.material], options.reference)
-        if type(options.scheme) is not type(defaults.scheme):
+        if type(options.scheme) is not kind:
             raise ValueError(
-                f"scheme of body {body.name!r} must be {type(defaults.scheme).__name__}(...), as the simulation's, for "
+                f"scheme of body {body.name!r} must be {kind.__name__}(...), as the simulation's, for "
                 f"all take the same steps, got {options.scheme}; pass scheme={type(options.scheme).__name__}(...) to "
                 "the simulation"
             )
@@ -115,10 +127,12 @@ def plan_media(bodies: Sequence[Body], defaults: Options) -> list[MediumPlan]:
     return media
 
 
-def options_of(body: Body, defaults: Options) -> Options:
-    """The options of a body: its own, and for those that are None the defaults."""
-    own = {name: getattr(body, name) for name in Options._fields}
-    return defaults._replace(**{name: value for name, value in own.items() if value is not None})
+def options_of(body: Body, defaults: Given) -> Options:
+    """The options of a body: its own, for those that are None the simulation's, then what suits its matter."""
+    found: dict[str, Any] = suited(body.material)._asdict()
+    for given in (defaults._asdict(), {name: getattr(body, name) for name in Options._fields}):
+        found |= {name: value for name, value in given.items() if value is not None}
+    return Options(**found)
 
 
 def ranges_of(bodies: Sequence[Body]) -> dict[str, range]:

@@ -143,8 +143,8 @@ def _tear(simulation: Failing, particle: int) -> UnstableError:
 
 def _first_torn(simulation: Failing) -> list[int]:
     """Number of the first particle with a new face of each medium that has one; reads the device."""
-    torn = [(medium, getattr(medium.stabiliser, "torn", None)) for medium in simulation.stepper.media]
-    places = [medium.span.start + int(place.numpy()[0]) for medium, place in torn if place is not None]
+    found = [(medium, getattr(medium.stabiliser, "potentials", None)) for medium in simulation.stepper.media]
+    places = [medium.span.start + int(own.torn.numpy()[0]) for medium, own in found if own is not None]
     ids = simulation.order.ids.numpy() if places else []
     return [int(ids[place]) for place in places if place < len(ids)]
 

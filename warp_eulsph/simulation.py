@@ -9,7 +9,7 @@ import warp as wp
 from .arguments import check_options, warn
 from .body import Body, checked_bodies
 from .boundaries import Assembly, Boundary
-from .building import Options, check_neighbourhoods, make_particles, make_state, plan_media, ranges_of
+from .building import Given, check_neighbourhoods, make_particles, make_state, plan_media, ranges_of
 from .checks import check_restorable, checked_box, objects, real_number, whole_number
 from .diagnostics import Diagnostics
 from .execution import graphs
@@ -28,12 +28,11 @@ from .scheme.health import UnstableError
 from .scheme.policy import Always, ReferencePolicy
 from .scheme.reference import Configuration
 from .scheme.time_step import DeviceClock, TimeStep
-from .scheme.verlet import Verlet
 from .scheme.world import Parts
 from .sorting import Sorting
 from .space import Space
 from .turns import in_turn
-from .weights import CubicSpline, Weight
+from .weights import Weight
 from .whole import Whole
 
 # Steps by graphs between two looks at the clock; graphs past the target or past a failure do nothing.
@@ -51,7 +50,9 @@ class Simulation(Looks):
         reference: when the reference is refreshed: Never() total Lagrangian, Every(k), Always() Eulerian. This,
             arrangement, scheme, weight and dilation are those of bodies that have none of their own; the step is one.
         arrangement: which bodies a refresh reads anew from their positions: Convected() those that flow, Current() all.
-        scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax.
+        scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax. Where this, weight and dilation are
+            None, each body takes what suits its matter (``defaults.py``): Verlet(), CubicSpline() and 1.3, or those of
+            liquids.
         time_step: TimeStep options.
         weight: SPH weight.
         dilation: smoothing length over spacing.
@@ -75,10 +76,10 @@ class Simulation(Looks):
         interactions: Sequence[Interaction] = (),
         reference: ReferencePolicy = Always(),
         arrangement: Arrangement = Convected(),
-        scheme: Scheme = Verlet(),
+        scheme: Scheme | None = None,
         time_step: TimeStep = TimeStep(),
-        weight: Weight = CubicSpline(),
-        dilation: float = 1.3,
+        weight: Weight | None = None,
+        dilation: float | None = None,
         periodic: Sequence[float] | None = None,
         dtype: type = wp.float64,
         device: wp.DeviceLike = None,
@@ -91,10 +92,12 @@ class Simulation(Looks):
         self.device = wp.get_device(device)
         self.boundaries = tuple(objects(boundaries, Boundary, "boundaries", "Fixed(lambda X: X[:, 0] < 0.1)"))
         self.interactions = tuple(objects(interactions, Interaction, "interactions", "an Interaction"))
-        self.reference, self.arrangement, self.dilation = reference, arrangement, dilation
+        self.reference, self.arrangement = reference, arrangement
         box = checked_box(periodic, self.space.dim)
-        self.options = Options(reference, arrangement, scheme, weight, dilation)
+        self.options = Given(reference, arrangement, scheme, weight, dilation)
         media = plan_media(self.bodies, self.options)
+        first = media[0].options
+        self.dilation = first.dilation
         check_memory(self.space, [(each.n, each.reach, each.moves) for each in media], self.device)
         self.ranges = ranges_of(self.bodies)
         self.particles = make_particles(self.space, media, self.device)
@@ -106,8 +109,8 @@ class Simulation(Looks):
         touching = {two for interaction in self.bound_interactions for two in interaction.touching}
         self.encounters = Encounters(self.bodies, self.particles.share.numpy() == 0.0, box, touching)
         warn(self.bodies, self.encounters, self.space.real)
-        self.clock = DeviceClock(self.space, time_step, scheme.cfl, self.device)
-        self.stepper = scheme.build(
+        self.clock = DeviceClock(self.space, time_step, first.scheme.cfl, self.device)
+        self.stepper = first.scheme.build(
             Parts(
                 space=self.space,
                 U=make_state(self.space, self.bodies, self.device),

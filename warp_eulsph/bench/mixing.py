@@ -12,6 +12,7 @@ import functools
 import statistics
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -22,10 +23,13 @@ from ..boundaries import Velocity
 from ..geometry import box
 from ..materials import TaitLiquid
 from ..scheme.time_step import TimeStep
+from ..scheme.verlet import Verlet
 from ..simulation import Simulation
+from ..weights import CubicSpline
 
 SHIFT = 0.1  # of the fastest particle in a step, in spacings
 ROUNDS, STEPS_PER_ROUND = 5, 4
+OPTIONS: dict[str, Any] = {"scheme": Verlet(), "weight": CubicSpline(), "dilation": 1.3}
 LIQUID = TaitLiquid(density=1000.0, sound_speed=10.0)
 
 
@@ -45,7 +49,7 @@ def stirred_cube(x: np.ndarray, side: int, sort: bool) -> Simulation:
     """The liquid at positions ``x`` (n, 3), of which ``side`` fill an edge."""
     body = Body(x=x, volume=float(side) ** -3, spacing=1.0 / side, material=LIQUID)
     fixed = TimeStep(fixed=SHIFT / (2.0 * side))  # no velocity is above 2 m/s
-    return Simulation(body, boundaries=[Velocity(None, stirred)], time_step=fixed, sort=sort)
+    return Simulation(body, boundaries=[Velocity(None, stirred)], time_step=fixed, sort=sort, **OPTIONS)
 
 
 def compare(side: int, steps: int) -> dict[str, float]:

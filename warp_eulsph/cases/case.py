@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
-from ..building import Options, options_of
+from ..building import Given, options_of
 from ..interactions import Contact, Interaction, RigidBody
 from ..materials import Material
 from ..output import DEFAULT_FIELDS, FIELDS, Probe
@@ -26,6 +26,8 @@ from .values import Formula, Number, PlaceFormula, ZoneFormula
 
 #: What a body may have of its own.
 OWN = "of this body; that of the case where it is left out"
+#: What takes its value from the matter of each body.
+SUITED = "what suits the matter of each body where it is left out"
 
 
 class MirrorPlane(Table):
@@ -123,7 +125,9 @@ class Case(Problem):
     interaction: list[open_choice(Interaction)] = Field([], description="other forces between bodies")  # type: ignore
     reference: choice(ReferencePolicy) = Field("Always", validate_default=True)  # type: ignore[valid-type]
     arrangement: choice(Arrangement) = Field("Convected", validate_default=True)  # type: ignore[valid-type]
-    scheme: choice(Scheme) = Field("Verlet", validate_default=True)  # type: ignore[valid-type]
+    scheme: choice(Scheme, optional=True) = Field("None", validate_default=True, description=SUITED)  # type: ignore
+    weight: choice(Weight, optional=True) = Field("None", validate_default=True, description=SUITED)  # type: ignore
+    dilation: Number | None = Field(None, gt=0.0, description=f"smoothing length over spacing; {SUITED}")
     time_step: choice(TimeStep) = Field("TimeStep", validate_default=True)  # type: ignore[valid-type]
     settle: Number | None = Field(
         None, gt=0.0, description="end when in equilibrium to this residual; needs the condition Damping"
@@ -141,7 +145,7 @@ class Case(Problem):
         """The simulation at its start; raises as ``Problem.build``."""
         bodies, ghosts = [], []
         space = self.space
-        defaults = Options(
+        defaults = Given(
             reference=self.reference.make(),
             arrangement=self.arrangement.make(),
             scheme=self.scheme.make(),

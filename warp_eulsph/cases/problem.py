@@ -12,7 +12,6 @@ from ..output.fields import SnapshotField
 from ..output.recorded import Recorded
 from ..schedule import AnyOf, AtTimes, EverySteps, EveryTime, Schedule
 from ..space import Space
-from ..weights import Weight
 from .expressions import nearest
 from .options import Table, Zone, choice, made
 from .values import Number, Whole
@@ -71,8 +70,6 @@ class Problem(Table):
     until: Number = Field(gt=0.0, description="end time [s]")
     parameters: dict[str, Number] = Field({}, description="numbers that formulas may use by name, or formulas of those")
     definitions: dict[str, str] = Field({}, description="formulas of place and time that others may use by name")
-    weight: choice(Weight) = Field("CubicSpline", validate_default=True)  # type: ignore[valid-type]
-    dilation: Number = Field(1.3, gt=0.0, description="smoothing length over spacing")
     periodic: list[Number] | None = Field(None, description="lengths [m] of a periodic box at the origin; 0 is open")
     precision: Precision = Field("double", description="of the simulation")
     device: str | None = Field(None, description="Warp device such as cuda:0; Warp's default otherwise")

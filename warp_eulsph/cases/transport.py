@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from ..output import TRANSPORT_FIELDS
 from ..scheme.scalar import ConservationLaw, LinearAdvection, ScalarScheme
 from ..transport import Transport
+from ..weights import Weight
 from .expressions import COORDINATES
 from .options import Table, Zone, choice, made, one_of
 from .problem import PRECISIONS, OutputTable, Problem
@@ -45,6 +46,8 @@ class TransportCase(Problem):
     """
 
     transport: TransportTable
+    weight: choice(Weight) = Field("CubicSpline", validate_default=True)  # type: ignore[valid-type]
+    dilation: Number = Field(1.3, gt=0.0, description="smoothing length over spacing")
     scheme: choice(ScalarScheme) = Field("TwoStepLaxWendroff", validate_default=True)  # type: ignore[valid-type]
     output: TransportOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     time_step: Number = Field(gt=0.0, description="length of the steps [s]; CFL number = velocity time_step/spacing")

@@ -198,6 +198,8 @@ class Material(ABC):
     flows: ClassVar[bool] = False
     #: F is counted from the last step, not from the start: only ``Always()`` will do for a reference.
     forgets: ClassVar[bool] = False
+    #: At rest it has no pressure, and in motion little of ρ c²: what the defaults of liquids are for.
+    liquid: ClassVar[bool] = False
     #: P is linear in F − I: for small strains and rotations only, because a rotation then causes stress.
     linear: ClassVar[bool] = False
 

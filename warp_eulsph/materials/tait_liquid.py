@@ -3,7 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
@@ -24,6 +24,7 @@ class TaitLiquid(Fluid):
 
     sound_speed: float
     gamma: float = 7.0
+    liquid: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

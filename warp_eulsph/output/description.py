@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..body import Body
-from ..building import Options
+from ..building import Options, options_of
 from .describer import Describer
 from .recorded import Recorded, RecordedSolids, RecordedTransport, solids, transport
+
+# What a body is told to have only where it has it.
+SELDOM = (*Options._fields, "bonded")
 
 
 def describe(simulation: Recorded) -> dict[str, Any]:
@@ -60,7 +63,7 @@ def _solids(simulation: RecordedSolids) -> dict[str, Any]:
         "time_step": plain(simulation.clock.option),
         "dilation": simulation.dilation,
         "sort": simulation.sorting.on,
-        "bodies": {body.name: _body(body) for body in simulation.bodies},
+        "bodies": {body.name: _body(body, simulation) for body in simulation.bodies},
         "boundaries": {
             str(i): {**plain(boundary), "particles": plain(condition.indices)}
             for i, (boundary, condition) in enumerate(conditions)
@@ -68,11 +71,14 @@ def _solids(simulation: RecordedSolids) -> dict[str, Any]:
     }
 
 
-def _body(body: Body) -> dict[str, Any]:
-    """A body, with those options that it has of its own."""
-    options: dict[str, Any] = plain(body)
-    seldom = (*Options._fields, "bonded")
-    return {name: value for name, value in options.items() if name not in seldom or getattr(body, name) is not None}
+def _body(body: Body, simulation: RecordedSolids) -> dict[str, Any]:
+    """A body, with those options that it has of its own or that its matter is given otherwise than the first one's."""
+    described: dict[str, Any] = plain(body)
+    first, own = (options_of(each, simulation.options)._asdict() for each in (simulation.bodies[0], body))
+    for name in ("scheme", "weight", "dilation"):
+        if getattr(body, name) is None and own[name] != first[name]:
+            described[name] = plain(own[name])
+    return {name: value for name, value in described.items() if name not in SELDOM or value is not None}
 
 
 def plain(value: Any) -> Any:

@@ -9,7 +9,7 @@ import warp as wp
 
 from ..body import Body
 from ..boundaries import Bound, Boundary
-from ..building import Options
+from ..building import Given
 from ..diagnostics import Diagnostics
 from ..interactions import BoundInteraction, Interaction
 from ..order import Order
@@ -87,7 +87,7 @@ class RecordedSolids(Recorded, Protocol):
     conditions: list[Bound]
     interactions: tuple[Interaction, ...]
     bound_interactions: list[BoundInteraction]
-    options: Options
+    options: Given
     reference: ReferencePolicy
     arrangement: Arrangement
     dilation: float

@@ -6,25 +6,16 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from ..atomics import lower_to
 from ..fields import neighbour_structure, structure
 from ..linalg import det, inverse
-from ..operators.row_sums import laplacian_sum, outer_sum
+from ..operators.row_sums import outer_sum
 from ..space import Space
 from ..structs import ParticleArrays, StateArrays
 from .dissipation import UpwindForces
 from .flux import Flux
-from .health import WELL
+from .potentials import Potentials
 from .reference import Configuration, reference_spacing
 from .stabiliser import Correction
-
-# Share of the residual that a sweep corrects, by dimension: the reciprocal of the largest eigenvalue on a lattice,
-# rounded down (at dilation 1.3, in 1-D at 1.2 too; `python -m warp_eulsph.validation.balance_sweeps`). What is
-# corrected too far repels in tension, pairs in compression.
-RELAXATION = {1: 0.52, 2: 0.75, 3: 0.85}
-
-# A defect of more than a particle's own face is no irregularity: the body has opened there, or closed.
-OPENED = 1.0
 
 
 @dataclass(frozen=True)
@@ -54,72 +45,6 @@ class Balance(Correction):
     def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "BalancedPairs":
         """Allocate."""
         return BalancedPairs(self, space, particles, device)
-
-
-@functools.cache
-def _make_renew(space: Space) -> wp.Kernel:
-    """Kernel: s_a ← e_a where the body has opened or closed, which leaves nothing to balance there (M13).
-
-    ``torn`` takes the place of the first particle with a new face.
-    """
-    real, vec = space.real, space.vec
-    Reference, dim = structure(space, "Reference"), space.dim
-    most = OPENED**dim
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def renew(
-        first: int,
-        reference: Reference,
-        defect: wp.array(dtype=vec),
-        surface: wp.array(dtype=vec),
-        torn: wp.array(dtype=wp.int32),
-    ):
-        a = first + wp.tid()
-        opening = wp.length(defect[a])  # |d|ᵈ/Vᵈ⁻¹, the d-th power of |d| over the face: no root to take
-        for _ in range(wp.static(dim - 1)):
-            opening *= wp.length(defect[a]) / reference.V[a]
-        if opening > real(most):
-            if wp.length(surface[a] + defect[a]) > wp.length(surface[a]):
-                lower_to(torn, a)
-            surface[a] = surface[a] + defect[a]
-            defect[a] = vec()
-
-    return renew
-
-
-@functools.cache
-def _make_relax(space: Space, simd: bool, start: bool) -> wp.Kernel:
-    """Kernel: one sweep of damped Jacobi on Σ_b ω_ab (ψ_a − ψ_b) = K_a d_a, ω_ab = V_a V_b g_ab (M13).
-
-    K_a, because the force of shifted positions comes multiplied by L = K⁻¹. With ``start`` the sweep is the first, from
-    ψ = 0, whose sums are zero.
-    """
-    real, vec, mat = space.real, space.vec, space.mat
-    relaxation = RELAXATION[space.dim]
-    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
-    sum_of = laplacian_sum(space, simd)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def relax(
-        first: int,
-        reference: Reference,
-        near: Neighbours,
-        K: wp.array(dtype=mat),
-        defect: wp.array(dtype=vec),
-        psi: wp.array(dtype=vec),
-        out: wp.array(dtype=vec),
-    ):
-        a = first + wp.tid()
-        psi_a = vec()
-        residual = K[a] @ defect[a] / reference.V[a]
-        if wp.static(not start):
-            psi_a = psi[a]
-            residual += sum_of(a, near, psi, reference.diagonal)
-        if reference.diagonal[a] > real(0.0):
-            psi_a += residual * (real(relaxation) / reference.diagonal[a])
-        out[a] = psi_a
-
-    return relax
 
 
 @functools.cache
@@ -167,25 +92,17 @@ class BalancedPairs(UpwindForces):
 
     def __init__(self, option: Balance, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
         super().__init__(space, device)
-        self.option, self.particles, n = option, particles, len(particles.mass)
-        self.torn = wp.full(1, WELL, dtype=wp.int32, device=device)
-        self.defect, self.psi, self._other = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
+        self.option, self.particles = option, particles
+        self.potentials = Potentials(space, option.sweeps, len(particles.mass), device)
 
     def evolving(self) -> dict[str, wp.array]:
         """The potentials that shifting (M15) follows before the next refresh."""
-        return {"BalancedPairs.psi": self.psi}
+        return {"BalancedPairs.psi": self.potentials.psi}
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Balance the new reference."""
         reference, near, simd = configuration.fields, configuration.near, configuration.simd
-        n, K = len(self.psi), configuration.K
-        configuration.defect(state.surface, self.defect)
-        self._launch(_make_renew(self.space), n, [reference, self.defect, state.surface, self.torn])
-        for sweep in range(self.option.sweeps):
-            old, new = self.psi, self._other
-            if (self.option.sweeps - sweep) % 2:  # the last sweep writes ψ, the others take turns
-                old, new = new, old
-            arguments = [reference, near, K, self.defect, old, new]
-            self._launch(_make_relax(self.space, simd, sweep == 0), n, arguments)
-        self._launch(_make_shift(self.space), n, [self.particles, reference, self.psi, self.option.bound])
+        self.potentials.find(configuration, state)
+        psi, n, K = self.potentials.psi, len(self.potentials.psi), configuration.K
+        self._launch(_make_shift(self.space), n, [self.particles, reference, psi, self.option.bound])
         self._launch(_make_correct(self.space, simd), n, [reference, near, K, configuration.poor])

@@ -15,6 +15,7 @@ from .base import Scheme
 from .breaking import Breaking
 from .dissipation import UpwindForces
 from .dual_forces import DualForces
+from .exposure import Exposure
 from .flux import Flux
 from .heating import Heating
 from .limiter import MassDiffusion
@@ -63,7 +64,7 @@ def is_corrected(options: Scheme, policy: ReferencePolicy, surface_given: bool) 
 def _check_bonds(groups: Sequence[int], per_body: bool, who: str) -> None:
     """Raise ValueError where bodies are bonded and something closes its sums body by body."""
     if per_body and len(set(groups)) < len(groups):
-        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance(), and no shifting")
+        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance()")
 
 
 def _held(conditions: Sequence[Bound], span: range) -> np.ndarray:
@@ -94,7 +95,6 @@ class Medium:
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
-            _check_bonds(parts.groups, True, "shifting")
             held = _held(conditions, self.span)
             self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
@@ -191,10 +191,15 @@ class Medium:
         self.configuration.refresh(self.of(state))
 
     def find_surface(self, state: StateArrays) -> None:
-        """s_a = e_a at the start (M10)."""
-        nothing_yet = self.forces.free_v
+        """s_a = e_a at the start (M10), where the arrangement moves zero for all that are beside no free surface."""
+        nothing_yet, surface = self.forces.free_v, self.of(state).surface
         unit = None if self.sharpener is None else self.sharpener.unit()
-        self.configuration.defect(nothing_yet, self.of(state).surface, unit)
+        self.configuration.defect(nothing_yet, surface, unit)
+        if not self.policy.fixed:
+            everyone = wp.full(self.n, 1, dtype=wp.int32, device=self.device)
+            exposure = Exposure(self.space, self.particles, everyone, False, self.device)
+            exposure.find(self.configuration.fields, self.configuration.near, surface, nothing_yet)
+            exposure.clear(surface)
 
     def look_outward(self, state: StateArrays) -> None:
         """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""
@@ -215,7 +220,10 @@ class Medium:
 
     def stabilise(self, state: StateArrays) -> None:
         """Prepare the stabiliser for a new reference, and what else depends on it."""
-        self.stabiliser.refresh(self.configuration, self.of(state))
+        U = self.of(state)
+        self.stabiliser.refresh(self.configuration, U)
+        if self.shifter is not None:
+            self.shifter.look(self.configuration, self.stabiliser.potentials.defect, U)
         self.walls.renew()
         self._derive()
 
@@ -236,10 +244,9 @@ class Medium:
     def shift(self, state: StateArrays) -> None:
         """Shift the particles (M15), where the options say so."""
         if self.shifter is not None:
-            U = self.of(state)
+            U, psi = self.of(state), self.stabiliser.potentials.psi
             self.velocity_gradient(state)
             self.configuration.gradient(self._rows(U.F), self.grad_F)
-            psi = self.stabiliser.psi
             self.shifter.apply(self.configuration, psi, U, self.grad_v, self.grad_F, self.clock)
 
     # the lines of a step

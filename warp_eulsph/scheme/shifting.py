@@ -12,15 +12,13 @@ from ..fields import clock_structure, structure
 from ..linalg import inverse
 from ..space import Space
 from ..structs import ClockArrays, ParticleArrays, StateArrays
+from .exposure import Exposure
 from .flux import Flux
 from .health import WELL
 from .laws import Part
 from .projection import Projection, pad
 from .reference import Configuration
 
-# Next to a surface, where |s_a| exceeds this share of a particle's face, nothing is shifted: there sums are one-sided,
-# and so is the defect that says where to go. In lattices that is so in the outermost three layers.
-NEAR_SURFACE = 0.05
 # Least value of what has none: a constant of a kernel must be finite, in float32 too.
 NO_BOUND = -1e38
 
@@ -31,8 +29,9 @@ class Shifting:
 
     It keeps the arrangement even where stress is several times the modulus, for shear without end. It is not exact: a
     remap changes energy (account "shifting"), by some 1e-4 in bodies that need none. Momenta are kept by the least
-    change. Particles near surfaces and those with velocity conditions stay. Positions of material points are not
-    carried: conditions given by initial positions keep those of the particles.
+    change. Particles with velocity conditions stay, and so do those at a free surface, or beside another body that
+    they are bonded to, and all their neighbours: there sums are one-sided, and so is what says where to go. Positions
+    of material points are not carried: conditions given by initial positions keep those of the particles.
 
     Args:
         rate: share of ½ψ taken in one refresh; 1 is the tested value.
@@ -64,7 +63,6 @@ def _make_shift(space: Space) -> wp.Kernel:
     Nothing moves once the target time is reached or the run has failed.
     """
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
-    face = float(dim - 1) / float(dim)
     rows, invert, padded = space.row_gradient(dim**2), inverse(space), pad(space)
     Particles, Reference, State = (
         structure(space, "Particles"),
@@ -81,6 +79,7 @@ def _make_shift(space: Space) -> wp.Kernel:
         clock: Clock,
         psi: wp.array(dtype=vec),
         free: wp.array(dtype=wp.int32),
+        beside: wp.array(dtype=wp.int32),
         grad_v: wp.array(dtype=mat),
         grad_F: wp.array(dtype=rows),
         rate: real,
@@ -96,9 +95,8 @@ def _make_shift(space: Space) -> wp.Kernel:
         most = bound * particles.spacing[a] * reference.h[a] / particles.h[a]
         if length > most:
             delta = delta * (most / length)
-        surface = wp.length(state.surface[a])
         running = clock.bad[0] == WELL and clock.t[0] < clock.target[0]
-        if not running or free[a] == 0 or surface > real(NEAR_SURFACE) * wp.pow(reference.V[a], real(face)):
+        if not running or free[a] == 0 or beside[a] != 0:
             delta = vec()
         out[a] = delta
         mass = particles.mass[a]
@@ -189,12 +187,17 @@ class Shifter:
         free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
+        self.exposure = Exposure(space, particles, self.free, True, device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
         self.projection = Projection(space, particles, flux.bodies, device)
 
     def evolving(self) -> dict[str, wp.array]:
-        """Which particles may be shifted: no step changes it, but particles change places."""
-        return {"Shifter.free": self.free}
+        """Which particles may be shifted: for good, and before the next refresh."""
+        return {"Shifter.free": self.free, "Shifter.beside": self.exposure.beside}
+
+    def look(self, configuration: Configuration, defect: wp.array, U: StateArrays) -> None:
+        """Who stays until the next refresh, by the ``defect`` e_a − s_a [m^(d−1)] of this one."""
+        self.exposure.find(configuration.fields, configuration.near, U.surface, defect)
 
     def apply(
         self,
@@ -207,7 +210,19 @@ class Shifter:
     ) -> None:
         """Shift the particles of ``U``, whose gradients in the reference are given; ψ [m] are its potentials (M13)."""
         option, n, reference = self.option, len(psi), configuration.fields
-        arguments = [self.particles, reference, clock, psi, self.free, grad_v, grad_F, option.rate, option.bound, U]
+        arguments = [
+            self.particles,
+            reference,
+            clock,
+            psi,
+            self.free,
+            self.exposure.beside,
+            grad_v,
+            grad_F,
+            option.rate,
+            option.bound,
+            U,
+        ]
         arguments += [self._moved, self.impulse, self.projection.couples]
         self._launch(_make_shift(self.space), n, arguments)
         for remap in self._remaps:

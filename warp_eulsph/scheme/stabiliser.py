@@ -9,6 +9,7 @@ import warp as wp
 from ..space import Space
 from ..structs import ClockArrays, FluxArrays, ForceArrays, ParticleArrays, StateArrays
 from .flux import Flux
+from .potentials import Potentials
 from .reference import Configuration
 
 
@@ -53,8 +54,8 @@ class Stabiliser(ABC):
     corrects: ClassVar[bool] = True
     #: Whether walls take part in the sums (M28).
     takes_walls: ClassVar[bool] = False
-    #: Potentials [m], (n,) of vec, of corrections that have them.
-    psi: wp.array
+    #: Of corrections that have them (``Correction.has_potentials``).
+    potentials: Potentials
     #: κ of each particle, (n,), where walls take part (M27).
     kappa: wp.array
 

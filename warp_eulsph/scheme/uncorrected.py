@@ -13,11 +13,14 @@ from ..structs import ClockArrays, ParticleArrays, StateArrays
 from ..weights import Weight
 from .dissipation import UpwindForces
 from .flux import Flux
+from .potentials import Potentials
 from .reference import Configuration
 from .stabiliser import Correction, Sums
 
 # Spacings from which a weight is summed over a lattice.
 FAR = 8
+# Sweeps for the potentials that shifting follows.
+SWEEPS = 5
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,8 @@ class Uncorrected(Correction):
     Raises:
         ValueError: when the simulation is built: a body that flows and carries more than J.
     """
+
+    has_potentials = True
 
     def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "UncorrectedForces":
         """Allocate for the bodies of ``flux``."""
@@ -128,6 +133,7 @@ class UncorrectedForces(UpwindForces):
         self._of_pairs, self._exact = (wp.zeros(n, dtype=space.mat, device=device) for _ in range(2))
         self.kappa = wp.zeros(n, dtype=space.real, device=device)
         self._L: wp.array | None = None
+        self.potentials = Potentials(space, SWEEPS, n, device)
 
     def _weigh(self, configuration: Configuration) -> None:
         particles, dim = configuration.particles, self.space.dim
@@ -141,11 +147,16 @@ class UncorrectedForces(UpwindForces):
         """Take L out of the new reference."""
         if self._L is None:
             self._weigh(configuration)
+        self.potentials.find(configuration, state)
         self._launch(_make_replace(self.space), len(self.kappa), [self.kappa, self._L, self._of_pairs])
 
     def evolving(self) -> dict[str, wp.array]:
         """What L was, and κ, which goes with the particles."""
-        return {"Uncorrected.of_pairs": self._of_pairs, "Uncorrected.kappa": self.kappa}
+        return {
+            "Uncorrected.psi": self.potentials.psi,
+            "Uncorrected.of_pairs": self._of_pairs,
+            "Uncorrected.kappa": self.kappa,
+        }
 
     def turn(self, sums: Sums, clock: ClockArrays, fraction: float) -> None:
         """Pairs turn by the exact gradient, and pressure on them with them: else it has a moment."""

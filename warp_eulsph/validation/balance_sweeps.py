@@ -15,7 +15,8 @@ from ..body import Body
 from ..geometry import box
 from ..materials import NeoHookean
 from ..scheme.arrangement import Current
-from ..scheme.balance import RELAXATION, Balance
+from ..scheme.balance import Balance
+from ..scheme.potentials import RELAXATION
 from ..simulation import Simulation
 
 #: Particles along each axis: even, so that waves of two spacings fit in.
