@@ -139,9 +139,9 @@ class BoundContact(BoundInteraction):
         moving = [names[k] for k in np.flatnonzero((np.diag(self._felt) == 2) & ~stays)]
         if moving and self.option.between is not None:
             raise ValueError(
-                f"Contact: bodies that touch themselves must keep their arrangement and not break, {moving} do not: what "
-                "meets becomes neighbours where it is read anew. Leave them out of between, or build with "
-                "arrangement=Convected() and a material that does not break"
+                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew, or "
+                "may break; what meets there becomes neighbours. Leave them out of between, or build with "
+                "arrangement=Convected() and matter that does not break"
             )
         self._felt[(self._felt == 2) & ~stays] = 0
         if not self._felt.any():
