@@ -44,7 +44,8 @@ class Contact(Interaction):
 
     A body whose arrangement stays that of the start touches itself, too, where it folds, is crushed, or a notch closes:
     matter that neither feels each other by weights nor would by this law at the start. Where the arrangement is read
-    anew what meets becomes neighbours.
+    anew what meets becomes neighbours. Bodies that may break (``Failing``) do not touch themselves, nor do those that
+    are one medium with them.
 
     Args:
         between: pairs of names of bodies that touch each other, ("ring", "ring") for one that touches itself; all with
@@ -130,15 +131,17 @@ class BoundContact(BoundInteraction):
             self._measure(world, world.U)
 
     def _leave_out_moving(self, world: "World") -> None:
-        """Bodies whose arrangement is read anew do not touch themselves."""
+        """Bodies whose arrangement is read anew, or that may break, do not touch themselves."""
         names = list(self.assembly.bodies)
         fixed = np.concatenate([np.full(medium.n, medium.configuration.fixed) for medium in world.media])
+        fixed &= np.concatenate([np.full(medium.n, medium.breaking is None) for medium in world.media])
         stays = fixed[[own.start for own in self.assembly.bodies.values()]]
         moving = [names[k] for k in np.flatnonzero((np.diag(self._felt) == 2) & ~stays)]
         if moving and self.option.between is not None:
             raise ValueError(
-                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew; what meets "
-                "there becomes neighbours. Leave them out of between, or build with arrangement=Convected()"
+                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew, or "
+                "may break; what meets there becomes neighbours. Leave them out of between, or build with "
+                "arrangement=Convected() and matter that does not break"
             )
         self._felt[(self._felt == 2) & ~stays] = 0
         if not self._felt.any():
