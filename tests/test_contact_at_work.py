@@ -54,18 +54,21 @@ def test_the_same_bits_on_any_number_of_threads():
     assert found[0] == found[1]
 
 
-def test_sorted_in_memory_it_goes_on():
-    """A drop, whose particles are sorted, on a solid beside it: the same but for the order of sums."""
+@pytest.mark.parametrize("balanced", [True, False])
+def test_sorted_in_memory_it_goes_on(balanced):
+    """A drop, whose particles are sorted, on a solid beside it or in its sums: the same but for the order of sums."""
+    own = {"scheme": es.Verlet(), "weight": es.CubicSpline(), "dilation": 1.3} if balanced else {}
     found = []
     for sort in (False, True):
         h = 0.1
         block = es.Body(x=rectangle(20, 4, h), volume=h * h, material=SOFT, name="block")
         water = es.TaitLiquid(density=1000.0, sound_speed=50.0)
         x = rectangle(8, 6, h, (0.65, 0.4))
-        drop = es.Body(x=x, volume=h * h, material=water, velocity=(0.5, -5.0), name="drop")
+        drop = es.Body(x=x, volume=h * h, material=water, velocity=(0.5, -5.0), name="drop", **own)
         simulation = es.Simulation([block, drop], interactions=[es.Contact(friction=0.3)])
         simulation.step(8)
-        assert simulation.energy()["held"] > 0.0
+        assert (simulation.energy()["held"] > 0.0) == balanced
+        assert np.abs(simulation.interaction_force).max() > 0.0
         if sort:
             random = np.random.default_rng(1)
             simulation.sorting.permute(np.concatenate([random.permutation(80), 80 + random.permutation(48)]))

@@ -266,6 +266,7 @@ class BoundContact(BoundInteraction):
         if self.skin.changes:
             held |= {
                 "found_at": self._found.at,
+                "stale": self._found.stale,
                 "there": self.skin.there,
                 "area": self.skin.area,
                 "bend": self.skin.bend,

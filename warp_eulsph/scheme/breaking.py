@@ -123,7 +123,8 @@ class Breaking:
 
     def evolving(self) -> dict[str, wp.array]:
         """What a checkpoint must hold."""
-        return {"Breaking.first": self.first} | ({"Breaking.cut": self.cut} if len(self.cut) else {})
+        held = {"Breaking.first": self.first, "Breaking.fresh": self._fresh}
+        return held | ({"Breaking.cut": self.cut} if len(self.cut) else {})
 
     def update(self, F: wp.array) -> None:
         """After a full step: note what has failed, cut off what has opened; launches only."""
@@ -141,9 +142,11 @@ class Breaking:
 
     def rebuild(self) -> None:
         """Cut off again what was, after weights were made anew."""
+        grew = wp.clone(self._fresh)
         self._fresh.zero_()
         self.frayed.zero_()
         self._cut()
+        wp.copy(self._fresh, grew)  # of the last step still
 
     def _cut(self) -> None:
         if len(self.cut):
