@@ -95,10 +95,16 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
     return cut_pairs
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def _tell(fresh: wp.array(dtype=wp.int32), grew: wp.array(dtype=wp.int32)):
-    if fresh[0] != wp.static(WELL):
-        grew[0] = 1
+@functools.cache
+def _make_tell() -> wp.Kernel:
+    """Kernel of one thread: ``grew`` where something was cut."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def tell(fresh: wp.array(dtype=wp.int32), grew: wp.array(dtype=wp.int32)):
+        if fresh[0] != wp.static(WELL):
+            grew[0] = 1
+
+    return tell
 
 
 class Breaking:
@@ -138,7 +144,7 @@ class Breaking:
 
     def tell(self, grew: wp.array) -> None:
         """Set ``grew``, (1,) int32, to 1 if particles were cut off in the last update; launches only."""
-        self._launch.once(_tell, 1, [self._fresh, grew])
+        self._launch.once(_make_tell(), 1, [self._fresh, grew])
 
     def rebuild(self) -> None:
         """Cut off again what was, after weights were made anew."""

@@ -70,13 +70,13 @@ def _make_beside(space: Space, apart: bool) -> wp.Kernel:
 
 @functools.cache
 def _make_clear(space: Space) -> wp.Kernel:
-    """Kernel: s_a ← 0 where a particle is not beside a free surface."""
+    """Kernel: s_a ← 0 where a particle is not near a free surface."""
     vec = space.vec
 
     @wp.kernel(module="unique", enable_backward=False)
-    def clear(first: int, beside: wp.array(dtype=wp.int32), surface: wp.array(dtype=vec)):
+    def clear(first: int, near: wp.array(dtype=wp.int32), surface: wp.array(dtype=vec)):
         a = first + wp.tid()
-        if beside[a] == 0:
+        if near[a] == 0:
             surface[a] = vec()
 
     return clear
@@ -104,6 +104,11 @@ class Exposure:
         self._launch(_make_expose(self.space), n, [fields, surface, defect, self.free, self._exposed])
         self._launch(_make_beside(self.space, self.apart), n, [self.particles, near, self._exposed, self.beside])
 
-    def clear(self, surface: wp.array) -> None:
-        """``surface`` ← 0 for particles that are beside none: inside e_a is noise."""
-        self._launch(_make_clear(self.space), len(self.free), [self.beside, surface])
+    def clear(self, near: NeighbourRows, surface: wp.array) -> None:
+        """``surface`` ← 0 where neither a particle nor a neighbour is beside a free surface: there e_a is noise.
+
+        e_a has L of its neighbours in it, which are other than inside as far as their support reaches the surface.
+        """
+        n = len(self.free)
+        self._launch(_make_beside(self.space, False), n, [self.particles, near, self.beside, self._exposed])
+        self._launch(_make_clear(self.space), n, [self._exposed, surface])

@@ -191,7 +191,7 @@ class Medium:
         self.configuration.refresh(self.of(state))
 
     def find_surface(self, state: StateArrays) -> None:
-        """s_a = e_a at the start (M10), where the arrangement moves zero for all that are beside no free surface."""
+        """s_a = e_a at the start (M10), where the arrangement moves zero for all that are near no free surface."""
         nothing_yet, surface = self.forces.free_v, self.of(state).surface
         unit = None if self.sharpener is None else self.sharpener.unit()
         self.configuration.defect(nothing_yet, surface, unit)
@@ -199,7 +199,7 @@ class Medium:
             everyone = wp.full(self.n, 1, dtype=wp.int32, device=self.device)
             exposure = Exposure(self.space, self.particles, everyone, False, self.device)
             exposure.find(self.configuration.fields, self.configuration.near, surface, nothing_yet)
-            exposure.clear(surface)
+            exposure.clear(self.configuration.near, surface)
 
     def look_outward(self, state: StateArrays) -> None:
         """Which way out is: by M5 of weights as they are without tilt, or by the area vectors that bodies came with."""
