@@ -1,10 +1,11 @@
 """Liquid jet on a flat wall: force on the wall, and the sheets that run along it, by default options.
 
 A plane jet of width b and speed U strikes a rigid, frictionless wall at right angles and parts into two sheets.
-Pressure at its free surface is nil, so that far from the stagnation point each sheet has the speed U (Bernoulli) and half of
-the jet's width, and the wall takes all of its momentum: the force is ρ U² b per depth (Batchelor, An Introduction to Fluid
-Dynamics, 1967, §6.3). Here b = U = ρ = 1, c0 = 20 U, and the jet is 8 b long. The force is its impulse over the time
-from 2 to 6 b/U, after the front has spread and before the end arrives; sheets are looked at 2.5 b from the middle.
+Pressure at its free surface is nil, so that far from the stagnation point each sheet has the speed U (Bernoulli) and
+half of the jet's width, and the wall takes all of its momentum: the force is ρ U² b per depth (Batchelor, An
+Introduction to Fluid Dynamics, 1967, §6.3). Here b = U = ρ = 1, c0 = 20 U, and the jet is 8 b long. The force is its
+impulse over the time from 2 to 6 b/U, after the front has spread and before the end arrives; sheets are looked at
+2.5 b from the middle.
 """
 
 from collections.abc import Sequence
