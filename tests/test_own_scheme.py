@@ -77,7 +77,7 @@ def test_what_a_scheme_does_not_offer_is_none():
 @pytest.mark.parametrize("correction", [None, es.PairAreas(), es.SurfaceVectors()], ids=repr)
 @pytest.mark.parametrize("scheme", [es.Verlet, es.LaxWendroff])
 def test_shifting_needs_potentials(scheme, correction):
-    with pytest.raises(ValueError, match=r"shifting needs correction=Balance\(\), whose potentials it follows"):
+    with pytest.raises(ValueError, match=r"shifting needs correction=Balance\(\) or Uncorrected\(\), whose pot"):
         scheme(correction=correction, shifting=es.Shifting())
 
 

@@ -123,8 +123,8 @@ class BoundRigidBody(BoundInteraction):
         )
         stiffness, shear = traces.areas * moduli[body[traces.tops]].T / spacing[traces.tops]
         wet = _wet_points(world, traces.tops)
-        for _, own in wet:  # they feel its matter, not its face
-            stiffness[own] = shear[own] = 0.0
+        for _, own in wet:  # they feel its matter, and its face when they are about to pass it
+            traces.half[own] = shear[own] = 0.0
         m, row = len(traces.tops), np.repeat(np.arange(len(traces.tops)), np.diff(traces.start))
         inertia = np.bincount(row, traces.weights**2 / mass[traces.members], minlength=m)
         self.points = self._fill(traces, stiffness, shear, inertia)
@@ -220,7 +220,7 @@ class BoundRigidBody(BoundInteraction):
 
     def advance(self, world: "World") -> None:
         for wetting in self._wetted:
-            wetting.account(self._push, self._wrench, self._passed)
+            wetting.account(self._wrench, self._passed)
         self.motion.advance(world.clock.fields, self._wrench)
         self._tie(world)
 

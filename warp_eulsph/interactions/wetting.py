@@ -171,12 +171,14 @@ def _make_force(space: Space) -> wp.Kernel:
         reference: Reference,
         flux: Flux,
         pose: Pose,
+        own: wp.array(dtype=wp.vec3d),
         push: wp.array(dtype=wp.vec3d),
         wrench: wp.array(dtype=Wrench),
     ):
         i = first + wp.tid()
         G = met[i]
         k = wet[i]
+        own[i] = wp.vec3d()
         if wp.length_sq(G) > real(0.0):
             p = points.places[points.start[k]]
             a = p - offset
@@ -188,8 +190,9 @@ def _make_force(space: Space) -> wp.Kernel:
                 y[j] = wp.float64(x[p][j])
                 force[j] = wp.float64(n[j] * size)
             moment = wp.cross(y - pose.x[0], force)
-            push[k] = force
-            wrench[k] = -Wrench(force[0], force[1], force[2], moment[0], moment[1], moment[2])
+            own[i] = force
+            push[k] = push[k] + force
+            wrench[k] = wrench[k] - Wrench(force[0], force[1], force[2], moment[0], moment[1], moment[2])
 
     return wet_force
 
@@ -208,7 +211,7 @@ def _make_power(space: Space) -> wp.Kernel:
         x: wp.array(dtype=vec),
         v: wp.array(dtype=vec),
         pose: Pose,
-        push: wp.array(dtype=wp.vec3d),
+        own: wp.array(dtype=wp.vec3d),
         dt: wp.array(dtype=wp.float64),
         out: wp.array(dtype=wp.float64),
     ):
@@ -222,7 +225,7 @@ def _make_power(space: Space) -> wp.Kernel:
                 y[j] = wp.float64(x[p][j])
                 jump[j] = -wp.float64(v[p][j])
             jump += pose.v[0] + wp.cross(pose.spin[0], y - pose.x[0])
-            out[i] = dt[0] * wp.dot(push[wet[i]], jump)
+            out[i] = dt[0] * wp.dot(own[i], jump)
 
     return find_power
 
@@ -256,6 +259,7 @@ class Wetting:
         self._table = wp.array(table, dtype=wp.float64, device=device)
         self._kappa = medium.stabiliser.kappa
         self.met = wp.zeros(k, dtype=self.space.vec, device=device)
+        self._own = wp.zeros(k, dtype=wp.vec3d, device=device)  # forces [N] of the sums
         self._powers, self._add = wp.zeros(k, dtype=wp.float64, device=device), Sum(wp.float64, k, device)
         self._step = wp.zeros(1, dtype=wp.float64, device=device)
 
@@ -281,16 +285,16 @@ class Wetting:
         self._moves = self.body.motion.ahead(self.world.clock.fields, fraction, wrench)
 
     def press(self, push: wp.array, wrench: wp.array) -> None:
-        """Forces [N] on the points, and of these on the rigid body."""
+        """Add forces [N] on the points, and of these on the rigid body."""
         arguments = [*self._of(), self.medium.span.start, self.medium.configuration.fields, self.medium.flux.fields]
-        arguments += [self.body.motion.pose, push, wrench]
+        arguments += [self.body.motion.pose, self._own, push, wrench]
         self._launch(_make_force(self.space), len(self._wet), arguments)
 
-    def account(self, push: wp.array, wrench: wp.array, total: wp.array) -> None:
+    def account(self, wrench: wp.array, total: wp.array) -> None:
         """Add to ``total`` [J] what the wall did in the step to the energy that the liquid stores."""
         clock, mean = self.world.clock.fields, self.world.half.v
         moves, self._moves = self.body.motion.ahead(clock, 0.5, wrench), self.body.motion.pose
-        arguments = [*self._of(), mean, moves, push, clock.dt, self._powers]
+        arguments = [*self._of(), mean, moves, self._own, clock.dt, self._powers]
         self._launch(_make_power(self.space), len(self._wet), arguments)
         self._add(self._powers, self._step)
         self._launch.once(add_up, 1, [self._step, total])

@@ -37,7 +37,10 @@ class Scheme(ABC):
 
     def __post_init__(self) -> None:
         if self.shifting is not None and not (self.correction is not None and self.correction.has_potentials):
-            raise ValueError(f"shifting needs correction=Balance(), whose potentials it follows, got {self.correction}")
+            raise ValueError(
+                "shifting needs correction=Balance() or Uncorrected(), whose potentials it follows, got "
+                f"{self.correction}"
+            )
 
     @abstractmethod
     def build(self, parts: "Parts") -> "Stepper":

@@ -33,7 +33,7 @@ class Verlet(Scheme):
             or PairAreas() (M11, M12); None is the plain dual form, which pairs up in tension. Not used where nothing
             moves, where it is zero unless the bodies came with surface vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
-        shifting: what keeps moving arrangements even (M15), with Balance() only; None shifts nothing.
+        shifting: what keeps moving arrangements even (M15), with Balance() or Uncorrected(); None shifts nothing.
         tie: what ties positions to F where the arrangement does not move (M16); None leaves hourglass modes free.
         tilt: what pair weights are multiplied by near free faces, where the arrangement does not move (M17); None
             leaves coarse bodies soft.
