@@ -9,6 +9,7 @@ import warp as wp
 from ..execution import Launcher
 from ..fields import structure
 from ..reduce import Sum
+from ..scheme.projection import pad
 from ..space import Space
 from ..weights import Weight
 from .pressing import read_row, signed_gap, trace_structure
@@ -68,11 +69,24 @@ def behind_planes(weight: Weight, dim: int, h: float) -> np.ndarray:
 
 
 @functools.cache
+def grow_across(space: Space) -> wp.Function:
+    """``wp.func``: L ``grown`` twice in all directions but n: whole across a wall with the normal n (M28)."""
+    real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
+
+    @wp.func
+    def grow_across(L: mat, n: vec, grown: real) -> mat:
+        A = wp.identity(n=wp.static(dim), dtype=real) * grown + wp.outer(n, n) * (real(1.0) - grown)
+        return A @ L @ A
+
+    return grow_across
+
+
+@functools.cache
 def _make_meet(space: Space, distance: Any) -> wp.Kernel:
     """Kernel: M3 of what lies behind the plane of the wall, twice, as a vector towards it [1/m], of each point."""
     real, vec, dim = space.real, space.vec, space.dim
     gap, read, TracePoints = signed_gap(distance), read_row(space), trace_structure(space)
-    Reference = structure(space, "Reference")
+    Reference, grow = structure(space, "Reference"), grow_across(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def meet(
@@ -111,8 +125,7 @@ def _make_meet(space: Space, distance: Any) -> wp.Kernel:
                 n[j] = real(found[j])
             towards = n * (real(wp.float64(-2.0) * met) * kappa[a])
             grown = real(wp.sqrt(wp.float64(1.0) / (wp.float64(1.0) - across)))
-            A = wp.identity(n=wp.static(dim), dtype=real) * grown + wp.outer(n, n) * (real(1.0) - grown)
-            reference.L[a] = A @ reference.L[a] @ A
+            reference.L[a] = grow(reference.L[a], n, grown)
         out[i] = towards
 
     return meet
@@ -122,6 +135,7 @@ def _make_meet(space: Space, distance: Any) -> wp.Kernel:
 def _make_gradient(space: Space) -> wp.Kernel:
     """Kernel: ∇v += n n·(v_w − v_a) ⊗ G, as if the wall's matter went on as the wall does, and slid along it."""
     vec, mat, dim, TracePoints, real = space.vec, space.mat, space.dim, trace_structure(space), space.real
+    padded = pad(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def add_gradient(
@@ -140,9 +154,7 @@ def _make_gradient(space: Space) -> wp.Kernel:
         G = met[i]
         if wp.length_sq(G) > real(0.0):
             p = points.places[points.start[wet[i]]]
-            y = wp.vec3d()
-            for j in range(wp.static(dim)):
-                y[j] = wp.float64(x[p][j])
+            y = padded(x[p])
             spatial = pose.v[0] + wp.cross(pose.spin[0], y - pose.x[0])
             a = p - offset
             jump = -v[a]
@@ -157,7 +169,7 @@ def _make_gradient(space: Space) -> wp.Kernel:
 @functools.cache
 def _make_force(space: Space) -> wp.Kernel:
     """Kernel: the adjoint of that: V n n·(Q G) on the liquid, the opposite on the rigid body at the same place."""
-    real, vec, dim, TracePoints = space.real, space.vec, space.dim, trace_structure(space)
+    real, vec, padded, TracePoints = space.real, space.vec, pad(space), trace_structure(space)
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -184,12 +196,8 @@ def _make_force(space: Space) -> wp.Kernel:
             a = p - offset
             n = wp.normalize(G)
             size = reference.V[a] * wp.dot(n, flux.Q[a] @ G)
-            y = wp.vec3d()
-            force = wp.vec3d()
-            for j in range(wp.static(dim)):
-                y[j] = wp.float64(x[p][j])
-                force[j] = wp.float64(n[j] * size)
-            moment = wp.cross(y - pose.x[0], force)
+            force = padded(n * size)
+            moment = wp.cross(padded(x[p]) - pose.x[0], force)
             own[i] = force
             push[k] = push[k] + force
             wrench[k] = wrench[k] - Wrench(force[0], force[1], force[2], moment[0], moment[1], moment[2])
@@ -200,7 +208,7 @@ def _make_force(space: Space) -> wp.Kernel:
 @functools.cache
 def _make_power(space: Space) -> wp.Kernel:
     """Kernel: what the wall did to the stored energy of each point in the step, Δt f·(v_w − v̄) [J]."""
-    vec, dim, TracePoints, real = space.vec, space.dim, trace_structure(space), space.real
+    vec, padded, TracePoints, real = space.vec, pad(space), trace_structure(space), space.real
 
     @wp.kernel(module="unique", enable_backward=False)
     def find_power(
@@ -219,12 +227,7 @@ def _make_power(space: Space) -> wp.Kernel:
         out[i] = wp.float64(0.0)
         if wp.length_sq(met[i]) > real(0.0):
             p = points.places[points.start[wet[i]]]
-            y = wp.vec3d()
-            jump = wp.vec3d()
-            for j in range(wp.static(dim)):
-                y[j] = wp.float64(x[p][j])
-                jump[j] = -wp.float64(v[p][j])
-            jump += pose.v[0] + wp.cross(pose.spin[0], y - pose.x[0])
+            jump = pose.v[0] + wp.cross(pose.spin[0], padded(x[p]) - pose.x[0]) - padded(v[p])
             out[i] = dt[0] * wp.dot(own[i], jump)
 
     return find_power

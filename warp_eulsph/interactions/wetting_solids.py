@@ -15,7 +15,7 @@ from ..scheme.reference import LARGEST_GROWTH
 from ..space import Space
 from ..weights import Weight
 from ..weights.base import pair_weight
-from .wetting import MOST, add_up
+from .wetting import MOST, add_up, grow_across
 
 if TYPE_CHECKING:
     from ..scheme.medium import Medium
@@ -63,6 +63,7 @@ def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: which particles of the liquid have solids in their sums, and L of these: whole across (M28)."""
     vec, real, dim, vec3, pair = space.vec, space.real, space.dim, _grid_vector(space), _pair(weight, space)
     Reference, reach = structure(space, "Reference"), float(weight.support) * QUERY_MARGIN
+    grow = grow_across(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def meet(
@@ -96,8 +97,7 @@ def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
             if wp.static(dim > 1):
                 across = wp.min(scatter / real(wp.static(max(dim - 1, 1))), real(MOST))
             grown = wp.sqrt(real(1.0) / (real(1.0) - across))
-            A = wp.identity(n=wp.static(dim), dtype=real) * grown + wp.outer(n, n) * (real(1.0) - grown)
-            reference.L[a] = A @ reference.L[a] @ A
+            reference.L[a] = grow(reference.L[a], n, grown)
 
     return meet
 

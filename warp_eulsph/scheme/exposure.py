@@ -16,9 +16,25 @@ EXPOSED = 0.8
 
 
 @functools.cache
+def share_of_face(space: Space) -> wp.Function:
+    """``wp.func`` |e|ᵈ/Vᵈ⁻¹, the d-th power of |e| over the face of a particle of volume V: no root to take."""
+    real, vec, dim = space.real, space.vec, space.dim
+
+    @wp.func
+    def share_of_face(e: vec, V: real) -> real:
+        length = wp.length(e)
+        share = length
+        for _ in range(wp.static(dim - 1)):
+            share *= length / V
+        return share
+
+    return share_of_face
+
+
+@functools.cache
 def _make_expose(space: Space) -> wp.Kernel:
     """Kernel: which particles are at a free surface, e_a = s_a + d_a; none of those not ``free``."""
-    real, vec, dim, least = space.real, space.vec, space.dim, EXPOSED**space.dim
+    real, vec, share, least = space.real, space.vec, share_of_face(space), EXPOSED**space.dim
     Reference = structure(space, "Reference")
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -31,12 +47,8 @@ def _make_expose(space: Space) -> wp.Kernel:
         exposed: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
-        length = wp.length(surface[a] + defect[a])
-        share = length  # |e|ᵈ/Vᵈ⁻¹, the d-th power of |e| over the face: no root to take
-        for _ in range(wp.static(dim - 1)):
-            share *= length / reference.V[a]
         exposed[a] = 0
-        if free[a] != 0 and share > real(least):
+        if free[a] != 0 and share(surface[a] + defect[a], reference.V[a]) > real(least):
             exposed[a] = 1
 
     return expose

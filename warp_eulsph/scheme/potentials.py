@@ -10,6 +10,7 @@ from ..fields import neighbour_structure, structure
 from ..operators.row_sums import laplacian_sum
 from ..space import Space
 from ..structs import StateArrays
+from .exposure import share_of_face
 from .health import WELL
 from .reference import Configuration
 
@@ -28,9 +29,8 @@ def _make_renew(space: Space) -> wp.Kernel:
 
     ``torn`` takes the place of the first particle with a new face.
     """
-    real, vec = space.real, space.vec
-    Reference, dim = structure(space, "Reference"), space.dim
-    most = OPENED**dim
+    real, vec, Reference = space.real, space.vec, structure(space, "Reference")
+    share, most = share_of_face(space), OPENED**space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def renew(
@@ -41,10 +41,7 @@ def _make_renew(space: Space) -> wp.Kernel:
         torn: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
-        opening = wp.length(defect[a])  # |d|ᵈ/Vᵈ⁻¹, the d-th power of |d| over the face: no root to take
-        for _ in range(wp.static(dim - 1)):
-            opening *= wp.length(defect[a]) / reference.V[a]
-        if opening > real(most):
+        if share(defect[a], reference.V[a]) > real(most):
             if wp.length(surface[a] + defect[a]) > wp.length(surface[a]):
                 lower_to(torn, a)
             surface[a] = surface[a] + defect[a]
