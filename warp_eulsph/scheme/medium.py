@@ -98,7 +98,7 @@ class Medium:
             held = _held(conditions, self.span)
             self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
-        rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
+        rows = n if smoothing is not None and smoothing.needs_gradient else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
         self.sharpener: Sharpener | None = None
@@ -245,9 +245,11 @@ class Medium:
         """Shift the particles (M15), where the options say so."""
         if self.shifter is not None:
             U, psi = self.of(state), self.stabiliser.potentials.psi
-            self.velocity_gradient(state)
-            self.configuration.gradient(self._rows(U.F), self.grad_F)
-            self.shifter.apply(self.configuration, psi, U, self.grad_v, self.grad_F, self.clock)
+            grad_v = self.kept  # of this v; walls have moved since
+            if not self.steady or self.walls:
+                grad_v = self.grad_v
+                self.velocity_gradient(state)
+            self.shifter.apply(self.configuration, psi, U, grad_v, self.clock)
 
     # the lines of a step
 

@@ -21,6 +21,9 @@ class Walls:
     def __init__(self) -> None:
         self._walls: list[Wall] = []
 
+    def __bool__(self) -> bool:
+        return bool(self._walls)
+
     def take(self, wall: Wall) -> None:
         """Have another one take part, from the present reference on."""
         self._walls.append(wall)
