@@ -126,7 +126,7 @@ class Medium:
         users = [option for option in (options.dissipation, options.limiter) if option is not None]
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
-        self.walls = Walls()
+        self.walls = Walls(space.mat, n, device)
         self.heating: Heating | None = None
         self.volumes: VolumeFlux | None = None
         self.smoothed_F_k = self.configuration.fields.F
@@ -305,13 +305,13 @@ class Medium:
     def stress(self, state: StateArrays, fraction: float) -> None:
         """Q of F (M1), which is ``fraction`` · Δt ahead of the histories."""
         self.flux.compute(self.of(state).F, self.grad_v, self.configuration, self.clock, fraction)
-        self.stabiliser.exact(self.walls.without(self.of(state).v, self.grad_v, self.sums.grad_v))
+        self.stabiliser.exact(self.walls.without(self.grad_v))
         self.stabiliser.turn(self.sums, self.clock, fraction)
 
     def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
         at, v = self.of(state), self.of(rates).v
-        grad_v = self.stabiliser.exact(self.walls.without(v, self.grad_v, self.sums.grad_v))
+        grad_v = self.stabiliser.exact(self.walls.without(self.grad_v))
         if self.heating is not None:
             self.heating.note(at.x, v, grad_v)
         if self.pairs is not None:
