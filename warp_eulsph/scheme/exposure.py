@@ -63,7 +63,7 @@ def _make_beside(space: Space, apart: bool) -> wp.Kernel:
     # C++, for loops of Warp look at one neighbour after another
     @wp.func_native(f"""
     int found = exposed.data[a];
-    for (int k = begin; k < end; ++k) {{
+    for (int k = begin; k < end; k += stride) {{
         const int b = index.data[k];
         found |= exposed.data[b];
         {other}
@@ -74,6 +74,7 @@ def _make_beside(space: Space, apart: bool) -> wp.Kernel:
         a: int,
         begin: int,
         end: int,
+        stride: int,
         index: wp.array(dtype=int),
         exposed: wp.array(dtype=int),
         body: wp.array(dtype=int),
@@ -88,7 +89,7 @@ def _make_beside(space: Space, apart: bool) -> wp.Kernel:
         beside: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
-        beside[a] = any_beside(a, near.start[a], near.start[a + 1], near.index, exposed, particles.body)
+        beside[a] = any_beside(a, near.start[a], near.stop[a], near.stride, near.index, exposed, particles.body)
 
     return find_beside
 
