@@ -43,8 +43,9 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.Devi
     ints, doubles = 5, 2 + 2 * 7 / 64  # body, number, place, start, poor; energies, blocks of the books
     if vectors:
         reals += LANES * ((3 if moving else 4) + 2 * d)
-    elif not moving:
-        reals += LANES * d + d * d  # ∇v or Π; ∇v F⁻¹
+    else:
+        ints += 1  # stop
+        reals += 0 if moving else LANES * d + d * d  # ∇v or Π; ∇v F⁻¹
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1
