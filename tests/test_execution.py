@@ -256,3 +256,17 @@ def test_older_processors_find_the_same(tmp_path):
         found.append(np.load(tmp_path / f"{k}.npy"))
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=0.0, atol=1e-11 * np.abs(found[0]).max())
+
+
+def test_a_weight_without_its_slope_in_cpp_runs_beside_simd_kernels():
+    class OwnWeight(es.Weight):
+        support, sigma = es.WendlandC2.support, es.WendlandC2.sigma
+
+        def profile(self, real):
+            return es.WendlandC2().profile(real)
+
+    own, given = (
+        results(disordered(2, wp.float64, es.Always(), weight=weight, dilation=1.5), 3)
+        for weight in (OwnWeight(), es.WendlandC2())
+    )
+    assert_equal_to_round_off(own, given, wp.float64)

@@ -259,8 +259,9 @@ class Configuration:
             self._launch(_make_resolve(self.space), len(self.K), [self.particles, self.fields, self._steeper])
 
     def _weigh(self) -> None:
-        pair_sums = (make_pair_sums_simd if self.simd else make_pair_sums)(self.weight, self.space)
-        self._launch(pair_sums, len(self.K), [self.particles, self.fields, self.near, self.K])
+        by_simd = self.simd and self.weight.slope_cpp is not None
+        make = make_pair_sums_simd if by_simd else make_pair_sums
+        self._launch(make(self.weight, self.space), len(self.K), [self.particles, self.fields, self.near, self.K])
         for interpolation in self._interpolations.values():
             interpolation.refresh()
 
