@@ -90,7 +90,7 @@ def run(quick: bool) -> Sequence[Figure]:
         found = [Figure("tip_x_mm", 1e3 * x, 12.9, 17.5, 12.9), Figure("tip_y_mm", 1e3 * y, 0.6, 3.0, 0.6)]
     else:
         simulation = build(4)
-        rows = 1e3 * follow(simulation, MEASURED[:, 0][MEASURED[:, 0] < END])
+        rows = 1e3 * follow(simulation, [t for t in MEASURED[:, 0].tolist() if t < END])
         x, y = rows.max(axis=0)
         found = [Figure("largest_tip_x_mm", x, 35.0, 50.5, 46.0), Figure("largest_tip_y_mm", y, 10.0, 19.5, 17.1)]
         for (time, measured_x, measured_y), (x, y) in zip(1e3 * MEASURED, rows, strict=False):
