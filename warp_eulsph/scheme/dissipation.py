@@ -145,7 +145,7 @@ def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
     ):
         a = first + wp.tid()
         force = vec()
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             force += pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
         out[a] = force
 

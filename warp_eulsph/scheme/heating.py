@@ -46,7 +46,7 @@ def _make_heat(space: Space, sensed: bool) -> wp.Kernel:
         a = first + wp.tid()
         mean_a = v_old[a] + v_new[a]  # twice
         lost = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             force = pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
             lost += wp.dot(force, v_old[b] + v_new[b] - mean_a)

@@ -108,7 +108,7 @@ def _make_dissipate(space: Space, sensed: bool) -> wp.Kernel:
         fed = real(0.0)
         taken = real(0.0)
         dissipated = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             plain = v[b] - v_a
             upwind_ab = pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
@@ -143,7 +143,7 @@ def _make_correct(space: Space, limited: bool) -> wp.Kernel:
         a = first + wp.tid()
         V_a, v_a, Q_a, psi_a = reference.V[a], v[a], Q[a], psi[a]
         correction = vec()
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             f_ab = (Q_a + Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * V_a * near.w[k]))
             if wp.static(limited) and wp.dot(f_ab, v[b] - v_a) < real(0.0):

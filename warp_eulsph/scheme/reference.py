@@ -125,7 +125,7 @@ def _make_nearest(space: Space) -> wp.Kernel:
     def find_nearest(first: int, reference: Reference, near: Neighbours, nearest: wp.array(dtype=real)):
         a = first + wp.tid()
         least = real(wp.inf)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             least = wp.min(least, wp.length(separation(reference.x[near.index[k]], reference.x[a], near.box)))
         nearest[a] = least
 

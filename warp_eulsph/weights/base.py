@@ -12,7 +12,7 @@ from ..space import Space
 class Weight(ABC):
     """Radial weight W(r, h) = σ_d / h^d · w(q), q = r/h, zero from q = ``support`` on.
 
-    A new weight is one file: ``support``, ``sigma`` for 1-D, 2-D, 3-D, ``profile``, and ``slope_cpp`` if it shall be fast.
+    A new weight is one file: ``support``, ``sigma`` for 1-D, 2-D, 3-D, ``profile``, and ``slope_cpp`` for speed.
     """
 
     support: ClassVar[float]
