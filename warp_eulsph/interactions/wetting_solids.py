@@ -255,9 +255,10 @@ def _make_ask(weight: Weight, space: Space) -> wp.Kernel:
         square = real(0.0)
         for k in wp.hash_grid_query(liquid, at[i], reach):
             a = members[k] - offset
-            impedance = flux.impedance[a] * reference.V[a]
             size = wp.length(pair(own[k], at[i], reference.h[a], kappa[a] * V[i]))
-            square += impedance * impedance / mass[members[k]] * size * met[k]
+            if size > real(0.0):
+                impedance = flux.impedance[a] * reference.V[a]
+                square += impedance * impedance / mass[members[k]] * size * met[k]
         if square > real(0.0):
             raise_largest(largest, square / mass[places[i]])
 
