@@ -324,16 +324,8 @@ class WettingOfSolids:
         """Where all are in the present reference, which of the liquid is wet, and L of it."""
         self._note()
         reference, kappa = self.medium.configuration.fields, self.medium.stabiliser.kappa
-        arguments = [
-            self._solids.id,
-            self._at,
-            self._V,
-            *self._liquid_members(),
-            reference,
-            kappa,
-            self._wet,
-            self._met,
-        ]
+        arguments = [self._solids.id, self._at, self._V, *self._liquid_members()]
+        arguments += [reference, kappa, self._wet, self._met]
         self._launch(_make_meet(self._weight, self.space), len(self._wet), arguments)
 
     def _liquid_members(self) -> list[Any]:
