@@ -49,7 +49,7 @@ def make_beside(space: Space) -> wp.Kernel:
         k = first + wp.tid()
         c = members[k] - offset
         found = wanted[c]
-        for i in range(near.start[c], near.start[c + 1]):
+        for i in range(near.start[c], near.stop[c], near.stride):
             found = wp.max(found, wanted[near.index[i]])
         beside[k] = found * outermost[c]
 
@@ -200,7 +200,7 @@ def make_turn(space: Space) -> wp.Kernel:
                 w = weight_of(real(0.0), real(REACH) * particles.spacing[c])
                 xi = centres[c] * (real(0.5) * masses[c] - w)
                 force = levers[c] * wp.dot(normals[c], xi) + normals[c] * wp.dot(levers[c], xi)
-            for i in range(near.start[c], near.start[c + 1]):
+            for i in range(near.start[c], near.stop[c], near.stride):
                 a = near.index[i]
                 if wanted[a] == 1 and alike(outward[a], outward[c]):
                     apart = separation(reference.x[c], reference.x[a], near.box)
