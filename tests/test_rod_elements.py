@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from warp_eulsph.validation import rod_elements
-from warp_eulsph.validation.cases.necking import STEEL
+from warp_eulsph.validation.cases.necking import STEEL, load
 from warp_eulsph.validation.cases.taylor_bar import COPPER
 
 MU, KAPPA = COPPER.constants()["mu"], COPPER.constants()["kappa"]
@@ -41,8 +41,16 @@ def test_the_stress_returns_to_the_yield_stress(law):
     np.testing.assert_allclose(matter.deviator(F, J, inverse), s, rtol=0, atol=1e-9 * y.max())
 
 
-def test_coarse_elements_have_the_length_and_foot(capsys):
-    """Two per radius: within 2 % of the published middle of the length, and of what finer ones have at 20 µs."""
+def test_coarse_elements_bear_the_load_of_a_long_bar():
+    """At 3 % of elongation, before a neck: between the loads of the narrowest section and of the full one, nearly."""
+    ((radii, force),) = rod_elements.pulled(2, (0.03,))
+    full = float(load(3, np.log(1.03)))
+    assert 0.96 * full < force < 1.01 * full
+    assert 0.95 < radii[0] <= radii[-1] < 0.98
+
+
+def test_coarse_elements_have_the_length_and_foot():
+    """Two per radius at 20 µs: what finer ones have then."""
     ((length, foot, *_, strain),) = rod_elements.taylor(2, (20e-6,))
     assert length == pytest.approx(28.06e-3, rel=0.005) and foot == pytest.approx(6.10e-3, rel=0.05)
     assert 1.0 < strain < 2.5

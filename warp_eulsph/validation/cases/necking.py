@@ -32,8 +32,8 @@ RADIUS, LENGTH, WAIST = 6.413e-3, 53.334e-3, 0.982  # m, m, of the radius
 SPEED, RISE = 20.0, 1e-4  # m/s of the ends from each other, and the time [s] in which it is reached
 HARDENING = Voce(yield_stress=0.45e9, saturation=0.265e9, rate=16.93, modulus=0.12924e9)
 STEEL = J2(density=7850.0, young=206.9e9, poisson=0.29, hardening=HARDENING)
-#: Elongation -> radius over ``RADIUS`` of the layer half a spacing from the middle, 6 per radius, of round bars of finite
-#: elements (``validation/rod_elements.py``); later particles are too few for the neck.
+#: Elongation -> radius over ``RADIUS`` of the layer half a spacing from the middle, 6 per radius, of a round bar of
+#: finite elements (``validation/rod_elements.py``); later particles are too few for the neck.
 ELEMENTS = {0.1: 0.919, 0.2: 0.674}
 ELONGATIONS = np.arange(0.02, 0.405, 0.02)
 
