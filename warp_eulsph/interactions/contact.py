@@ -15,7 +15,7 @@ from ..execution import Launcher
 from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .friction import make_slip
-from .law import make_push, make_raise, make_rate, skin_structure
+from .law import make_give, make_push, make_raise, make_rate, skin_structure
 from .moved import Moved
 from .nearby import Nearby, matter_structure
 from .skin import Skin
@@ -120,6 +120,7 @@ class BoundContact(BoundInteraction):
         for name in ("places", "there", "area", "half", "modulus", "shear_modulus", "normal", "bend"):
             setattr(self._arrays, name, getattr(self.skin, name))
         k, n, device = len(self.skin.indices), world.n, world.device
+        self._arrays.given, self._granted = (wp.zeros(k, dtype=self.space.real, device=device) for _ in range(2))
         self._energy = wp.zeros(k, dtype=wp.float64, device=device)
         self._frequency = wp.zeros(1, dtype=self.space.real, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
@@ -206,7 +207,17 @@ class BoundContact(BoundInteraction):
             self.skin.find()
             self._found.note(U.x)
             self.nearby.forget()
+            self.nearby.look(U, clock.fields)
+            self._give(U)
         self.nearby.look(U, clock.fields, clock.option.growth)
+
+    def _give(self, U: StateArrays) -> None:
+        """What came to the surface presses nothing yet."""
+        if self.nearby.pairs:
+            self.skin.look(U)
+            arguments = [self._arrays, self.nearby.rows, U.x, self.skin.came, self._granted]
+            self._launch(make_give(self.space), len(self._granted), arguments)
+            wp.copy(self._arrays.given, self._granted)
 
     def check(self, world: "World", running: wp.array) -> None:
         if self.skin.changes:
@@ -270,6 +281,7 @@ class BoundContact(BoundInteraction):
                 "there": self.skin.there,
                 "area": self.skin.area,
                 "bend": self.skin.bend,
+                "given": self._arrays.given,
             }
         for k, wetting in enumerate(self._wettings):
             held |= {"passed": self._passed} | {f"{name}.{k}": array for name, array in wetting.evolving().items()}

@@ -60,9 +60,9 @@ class _Layer:
         arguments += [self._flowing, self.outward]
         self._launch(make_find(self.space), n, [*arguments, self.least, self.outermost])
 
-    def areas(self, places: wp.array, there: wp.array, area: wp.array, bend: wp.array) -> None:
-        """The face of each of its particles at ``places``, whether it is outermost, and how flat it lies."""
-        arguments = [*self._of(places), self.outward, self.outermost, self.alone, there, area, bend]
+    def areas(self, places: wp.array, there: wp.array, came: wp.array, area: wp.array, bend: wp.array) -> None:
+        """The face of each of its particles at ``places``, whether it is outermost, since now, and how flat it lies."""
+        arguments = [*self._of(places), self.outward, self.outermost, self.alone, there, came, area, bend]
         self._launch(make_area(self.space), len(places), arguments)
 
     def normals(self, places: wp.array, state: StateArrays, normal: wp.array, answer: wp.array) -> None:
@@ -113,7 +113,7 @@ class Skin:
         indices: numbers of the particles that are or may be outermost, (k,) int32, ascending.
         places: where they lie, (k,) int32 on the device, kept right.
         bodies: number of the body of each, (k,) int32, on the device.
-        there: whether it is outermost, (k,) int32.
+        there, came: whether it is outermost, and whether it is since the last ``find``, (k,) int32.
         area: face of each in the reference [m^(d−1)], (k,).
         half: distance from the particle to the surface, half a spacing [m], (k,).
         modulus, shear_modulus: ρ c² of pressure and of shear waves at F = I [Pa], (k,).
@@ -158,7 +158,7 @@ class Skin:
         self.bodies = wp.array(body, dtype=wp.int32, device=device)
         self.half = wp.array(0.5 * spacing, dtype=world.space.real, device=device)
         self.modulus, self.shear_modulus = (wp.array(M, dtype=world.space.real, device=device) for M in moduli.T)
-        self.there = wp.zeros(k, dtype=wp.int32, device=device)
+        self.there, self.came = (wp.zeros(k, dtype=wp.int32, device=device) for _ in range(2))
         self.area, self.bend = (wp.zeros(k, dtype=world.space.real, device=device) for _ in range(2))
         self.normal, self.slope = (wp.zeros(k, dtype=world.space.vec, device=device) for _ in range(2))
         self._beside = wp.full(k, 1, dtype=wp.int32, device=device)
@@ -169,7 +169,8 @@ class Skin:
         self.want(self._all)  # until somebody knows better
 
     def _arrays(self) -> list[wp.array]:
-        return [self.places, self.there, self.area, self.bend, self.normal, self.slope, self._answer, self._beside]
+        of_find = [self.places, self.there, self.came, self.area, self.bend]
+        return [*of_find, self.normal, self.slope, self._answer, self._beside]
 
     @property
     def changes(self) -> bool:
@@ -190,8 +191,8 @@ class Skin:
     def find(self) -> None:
         """Which particles are outermost in the present references, and the face of each; launches only."""
         self.find_layers()
-        for layer, (places, there, area, bend, *_) in zip(self._layers, self._parts, strict=True):
-            layer.areas(places, there, area, bend)
+        for layer, (places, there, came, area, bend, *_) in zip(self._layers, self._parts, strict=True):
+            layer.areas(places, there, came, area, bend)
 
     def rebuild(self) -> None:
         """Derive what goes by place, after particles changed places; all normals are asked for."""
@@ -211,7 +212,7 @@ class Skin:
 
     def look(self, state: StateArrays) -> None:
         """Normals of the skin where the particles are in ``state`` (struct ``State``); launches only."""
-        for layer, (places, _, _, _, normal, _, answer, _) in zip(self._layers, self._parts, strict=True):
+        for layer, (places, *_, normal, _, answer, _) in zip(self._layers, self._parts, strict=True):
             layer.normals(places, state, normal, answer)
 
     def turn(self, state: StateArrays, out: wp.array) -> None:
@@ -226,5 +227,5 @@ class Skin:
         """
         if self.space.dim > 1:
             for layer, parts in zip(self._layers, self._parts, strict=True):
-                places, _, _, _, _, slope, answer, beside = parts
+                places, *_, slope, answer, beside = parts
                 layer.turn(places, answer, beside, state, slope, out)
