@@ -22,7 +22,7 @@ CLOSING = 0.25
 
 @functools.cache
 def skin_structure(space: Space) -> Any:
-    """``wp.struct`` of a skin's arrays, as ``Skin`` has them, and ``given`` [m], the part of the gap that counts not."""
+    """``wp.struct`` of a skin's arrays, as ``Skin`` has them, and ``given`` [m], of ``make_give``."""
 
     @wp.struct
     class SkinArrays:
@@ -55,7 +55,8 @@ def rows_structure() -> Any:
 def facing(space: Space) -> wp.Function:
     """``wp.func`` row: how much two normals face each other, and its slope with n·n'.
 
-    1 up to 60° from opposite, 0 from 75.5° on.
+    1 up to 60° from opposite, 0 from 75.5° on, a cubic step between: where a ramp had its kinks surfaces that crease,
+    whose normals swing there, made a tenth of the energy of two rings.
     """
     real, vec, pair = space.real, space.vec, space.row(2)
 
@@ -68,7 +69,8 @@ def facing(space: Space) -> wp.Function:
             return pair(real(1.0), real(0.0))
         if share <= real(0.0):
             return pair(real(0.0), real(0.0))
-        return pair(share, real(-4.0))
+        left = real(1.0) - share
+        return pair(share * share * (real(1.0) + real(2.0) * left), real(-24.0) * share * left)
 
     return facing
 
@@ -253,10 +255,10 @@ def make_push(space: Space, rubs: bool) -> wp.Kernel:
 
 @functools.cache
 def make_give(space: Space) -> wp.Kernel:
-    """Kernel: how much nearer each particle may be before it is pressed [m], so that coming to the surface costs nothing.
+    """Kernel: how much nearer others may be to each before it is pressed [m].
 
-    What ``came`` to the surface within the range of others, unpressed until now, is given what it is too near; two that
-    came at once share it. It is taken back as far as they part.
+    What ``came`` to the surface within the range of others is given what they are too near, or energy would come from
+    nowhere; two that came at once share it. It is taken back as far as they part.
     """
     real, vec, SkinArrays, Rows = space.real, space.vec, skin_structure(space), rows_structure()
     meeting_of, weight_of = meeting(space), surface_weight(space)[0]
@@ -276,7 +278,7 @@ def make_give(space: Space) -> wp.Kernel:
         needed = real(0.0)
         for i in range(rows.start[k], rows.start[k + 1]):
             m = rows.index[i]
-            n, how = meeting_of(skin, k, m, x[skin.places[m]] - x[skin.places[k]])
+            _n, how = meeting_of(skin, k, m, x[skin.places[m]] - x[skin.places[k]])
             if how[4] * weight_of(how[2], how[3]) > real(0.0):
                 near = how[1] - how[0] + skin.given[k] + skin.given[m]
                 if came[k] == 1 and came[m] == 1:

@@ -12,7 +12,7 @@ from ..execution import Launcher, launch
 from ..space import Space
 from ..structs import StateArrays
 from .faces import make_area, make_find, make_outward
-from .normals import make_beside, make_lever, make_normals, make_turn, make_want
+from .normals import make_beside, make_lever, make_normals, make_planes, make_turn, make_want
 
 if TYPE_CHECKING:
     from ..scheme.medium import Medium
@@ -46,7 +46,8 @@ class _Layer:
         self.changes = self.breaking is not None
         self.changes |= self.outward is not medium.particles.outward and not flowing.all()
         self.least = 0.0 if exact else LARGE
-        self._normals, self._centres, self._levers = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
+        self._normals, self._centres = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(2))
+        self._levers = wp.zeros(n, dtype=space.mat, device=device)
         self._masses = wp.zeros(n, dtype=space.real, device=device)
         self.wanted = wp.zeros(n, dtype=wp.int32, device=device)
 
@@ -59,6 +60,9 @@ class _Layer:
         arguments = [self.medium.particles, configuration.fields, configuration.near, configuration.poor]
         arguments += [self._flowing, self.outward]
         self._launch(make_find(self.space), n, [*arguments, self.least, self.outermost])
+        if configuration.fixed and self.space.dim > 1:
+            arguments = [self.medium.particles, configuration.fields, configuration.near, self.outward, self.outermost]
+            self._launch(make_planes(self.space), n, [*arguments, self._normals, self._centres, self._masses])
 
     def areas(self, places: wp.array, there: wp.array, came: wp.array, area: wp.array, bend: wp.array) -> None:
         """The face of each of its particles at ``places``, whether it is outermost, since now, and how flat it lies."""
@@ -84,11 +88,12 @@ class _Layer:
         self, places: wp.array, answer: wp.array, beside: wp.array, state: StateArrays, slope: wp.array, out: wp.array
     ) -> None:
         """Add the forces on particles by which normals answer the slopes ∂E/∂n of an energy."""
-        arguments = [places, self.medium.span.start, self.wanted, answer, slope, self._levers]
-        self._launch(make_lever(self.space), len(places), arguments)
+        fixed = self.medium.configuration.fixed
+        arguments = [places, self.medium.span.start, self.medium.particles, self.wanted, self._normals, self._masses]
+        self._launch(make_lever(self.space, fixed), len(places), [*arguments, answer, slope, self._levers])
         arguments = [*self._of(places), self.medium.of(state), self.outward, self.wanted, beside]
-        arguments += [self._normals, self._centres, self._masses, self._levers, out]
-        self._launch(make_turn(self.space), len(places), arguments)
+        arguments += [self._centres, self._masses, self._levers, out]
+        self._launch(make_turn(self.space, fixed), len(places), arguments)
 
     def _of(self, places: wp.array) -> list[Any]:
         configuration = self.medium.configuration
