@@ -103,9 +103,9 @@ def test_simd_pair_sums_equal_portable(weight, dim, dtype):
     for simd in (False, True):
         execution.set_simd(simd)
         configuration = configuration_of(x, volume, h, weight=weight, real=dtype)
-        near, fields, pairs = configuration.near, configuration.fields, configuration.lists.pairs
-        arrays = [near.start, near.index[:pairs], near.w[:pairs], configuration.K, fields.row, fields.diagonal]
-        found[simd] = [array.numpy().copy() for array in arrays]
+        near, fields, lists = configuration.near, configuration.fields, configuration.lists
+        arrays = [array.numpy().copy() for array in (configuration.K, fields.row, fields.diagonal)]
+        found[simd] = [lists.lengths, lists.of_pairs(near.index), lists.of_pairs(near.w), *arrays]
     for k, (portable, vector) in enumerate(zip(found[False], found[True], strict=True)):
         if k < 2:
             assert np.array_equal(portable, vector)
@@ -168,9 +168,9 @@ def test_long_rows_and_far_away_particles_are_found():
     for simd in (False, True):
         execution.set_simd(simd)
         configuration = configuration_of(x, np.full(len(x), 1e-3), 0.45)
-        pairs = configuration.lists.pairs
-        found[simd] = configuration.near.start.numpy().copy(), configuration.near.index.numpy()[:pairs].copy()
-    assert np.diff(found[True][0]).max() > 600
+        lists = configuration.lists
+        found[simd] = lists.lengths, lists.of_pairs(lists.rows.index)
+    assert found[True][0].max() > 600
     assert all(np.array_equal(*both) for both in zip(found[False], found[True], strict=True))
 
 
@@ -182,7 +182,7 @@ def test_rows_of_far_apart_indices_are_sorted():
     for simd in (False, True):
         execution.set_simd(simd)
         configuration = configuration_of(x, np.full(n, 1.0 / n), 1.3 / n)
-        found[simd] = configuration.near.index.numpy()[: configuration.lists.pairs].copy()
+        found[simd] = configuration.lists.of_pairs(configuration.near.index)
     rows = found[True].reshape(-1, 1)
     assert np.ptp(rows) > 65536
     assert np.array_equal(found[False], found[True])
@@ -256,3 +256,17 @@ def test_older_processors_find_the_same(tmp_path):
         found.append(np.load(tmp_path / f"{k}.npy"))
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=0.0, atol=1e-11 * np.abs(found[0]).max())
+
+
+def test_a_weight_without_its_slope_in_cpp_runs_beside_simd_kernels():
+    class OwnWeight(es.Weight):
+        support, sigma = es.WendlandC2.support, es.WendlandC2.sigma
+
+        def profile(self, real):
+            return es.WendlandC2().profile(real)
+
+    own, given = (
+        results(disordered(2, wp.float64, es.Always(), weight=weight, dilation=1.5), 3)
+        for weight in (OwnWeight(), es.WendlandC2())
+    )
+    assert_equal_to_round_off(own, given, wp.float64)

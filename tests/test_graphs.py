@@ -146,7 +146,7 @@ def test_lists_that_are_full_let_the_host_step_in(reference, simd, monkeypatch):
         lists = simulation.stepper.configuration.lists
         simulation.step(12)
         for _ in range(10):
-            lists._reserve(lists.pairs)  # the next step refreshes the reference, and fills them
+            lists._reserve(lists.room)  # the next step refreshes the reference, and fills them
             simulation.step(6)
 
     monkeypatch.setattr(NeighbourLists, "make_room", counted)

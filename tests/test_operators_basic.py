@@ -6,8 +6,9 @@ import warp as wp
 from clouds import cloud, configuration_of
 from scipy.spatial import cKDTree
 
-from warp_eulsph import CubicSpline, Space
+from warp_eulsph import CubicSpline, Space, execution
 from warp_eulsph.operators.neighbours import NeighbourLists
+from warp_eulsph.operators.slices import places_taken
 from warp_eulsph.operators.smoothing import make_linear_exact
 
 CASES = [
@@ -65,8 +66,8 @@ def smooth(configuration, theta, f):
 
 def pairs_of(near):
     """The directed pairs (a, b), in the order of the rows."""
-    start, index = near.start.numpy(), near.index.numpy()
-    return [(a, int(b)) for a in range(len(start) - 1) for b in index[start[a] : start[a + 1]]]
+    start, stop, index = near.start.numpy(), near.stop.numpy(), near.index.numpy()
+    return [(a, int(b)) for a in range(len(stop)) for b in index[start[a] : stop[a] : near.stride]]
 
 
 # the operators
@@ -174,6 +175,23 @@ def test_neighbours_equal_a_tree(dim, real):
     found = pairs_of(lists.rows)
     assert found == tree_pairs(x, 2.0 * h)  # equality of lists: rows in order, each sorted, none twice
     assert lists.pairs == len(found)
+
+
+def test_rows_in_slices_lie_interleaved():
+    """Neighbour j of the 32 rows of a slice side by side, as the threads of a GPU read them; the lists are the same."""
+    execution.set_simd(False)
+    x = cloud(2, 13, jitter=0.4)[0]  # 169 rows: five slices, and nine rows in the sixth
+    lists = lists_of(x, 0.1)
+    start, stop, lengths = lists.rows.start.numpy(), lists.rows.stop.numpy(), lists.lengths
+    assert lists.rows.stride == 32
+    assert pairs_of(lists.rows) == tree_pairs(x, 0.2)
+    assert lists.pairs == lengths.sum() < lists.room == lists.capacity == places_taken(lengths) == start[-1]
+    for k in range(0, len(x), 32):
+        rows = slice(k, min(k + 32, len(x)))
+        assert np.array_equal(start[rows] - start[k], np.arange(rows.stop - k))
+        assert start[min(k + 32, len(x))] == start[k] + 32 * lengths[rows].max()
+    places = np.concatenate([np.arange(*span, 32) for span in zip(start[:-1], stop, strict=True)])
+    assert len(set(places)) == lists.pairs  # no two pairs at one place
 
 
 @pytest.mark.parametrize("dim", [1, 2, 3])

@@ -14,10 +14,9 @@ def test_every_image_is_counted_once(dim, side, dilation):
     x, volume = cloud(dim, side, jitter=0.3)
     x[0] -= 1.0  # one period outside the box
     h = dilation / side
-    near = configuration_of(x, volume, h, box=(1.0,) * dim).near
+    lists = configuration_of(x, volume, h, box=(1.0,) * dim).lists
     away = x[:, None] - x[None]
     r = np.linalg.norm(away - np.round(away), axis=-1) + 9.0 * np.eye(len(x))
     expected = [np.flatnonzero(row < CubicSpline.support * h) for row in r]
-    start = near.start.numpy()
-    assert np.array_equal(np.diff(start), [len(row) for row in expected])
-    assert np.array_equal(near.index.numpy()[: start[-1]], np.concatenate(expected))
+    assert np.array_equal(lists.lengths, [len(row) for row in expected])
+    assert np.array_equal(lists.of_pairs(lists.rows.index), np.concatenate(expected))

@@ -49,10 +49,14 @@ def test_the_books_close(reference, dim, dtype):
 
 def tied_by_pairs(simulation, secant):
     """¼ Σ Σ χ Ē V_a w_ab √(s_a s_b) |r_ab|² [J] of secants s, in numpy."""
-    reference, near = simulation.configuration.fields, simulation.configuration.near
-    X, V, w, own = (array.numpy() for array in (reference.x, reference.V, near.w, near.own))
+    reference, lists, near = (
+        simulation.configuration.fields,
+        simulation.configuration.lists,
+        simulation.configuration.near,
+    )
+    X, V, w, own = reference.x.numpy(), reference.V.numpy(), lists.of_pairs(near.w), lists.of_pairs(near.own)
     w, x, F, root = w + np.abs(w - own), simulation.x, simulation.F, np.sqrt(secant)
-    a, b = np.repeat(np.arange(len(X)), np.diff(near.start.numpy())), near.index.numpy()
+    a, b = np.repeat(np.arange(len(X)), lists.lengths), lists.of_pairs(near.index)
     r = x[b] - x[a] - 0.5 * np.einsum("nij,nj->ni", F[a] + F[b], X[b] - X[a])
     [(M, mu)] = simulation.stepper.flux.moduli()
     return 0.25 * 0.5 * min(M, 4.0 * mu) * (V[a] * w * root[a] * root[b] * (r**2).sum(axis=1)).sum()

@@ -34,10 +34,14 @@ def tied(simulation, x, F):
 
 def pair_energy(simulation, x, F, modulus):
     """¼ Σ Σ χ Ē V_a w_ab |r_ab|² [J], in numpy."""
-    reference, near = simulation.configuration.fields, simulation.configuration.near
-    X, V, w, own = (array.numpy() for array in (reference.x, reference.V, near.w, near.own))
+    reference, lists, near = (
+        simulation.configuration.fields,
+        simulation.configuration.lists,
+        simulation.configuration.near,
+    )
+    X, V, w, own = reference.x.numpy(), reference.V.numpy(), lists.of_pairs(near.w), lists.of_pairs(near.own)
     w = w + np.abs(w - own)
-    a, b = np.repeat(np.arange(len(X)), np.diff(near.start.numpy())), near.index.numpy()
+    a, b = np.repeat(np.arange(len(X)), lists.lengths), lists.of_pairs(near.index)
     r = x[b] - x[a] - 0.5 * np.einsum("nij,nj->ni", F[a] + F[b], X[b] - X[a])
     return 0.25 * modulus * (V[a] * w * (r**2).sum(axis=1)).sum()
 
@@ -142,9 +146,9 @@ def test_mismatch_is_seen(dim, reference):
     x, F = X + 0.1 / n * rng.normal(size=X.shape), np.eye(dim) + 0.1 * rng.normal(size=(n**dim, dim, dim))
     simulation.stepper.U.x.assign(x)
     simulation.stepper.U.F.assign(F)
-    near, w = simulation.configuration.near, simulation.configuration.near.w.numpy()
-    a, b = np.repeat(np.arange(n**dim), np.diff(near.start.numpy())), near.index.numpy()[: len(w)]
-    a, w = a[: len(b)], w[: len(a)]
+    lists = simulation.configuration.lists
+    b, w = lists.of_pairs(lists.rows.index), lists.of_pairs(lists.rows.w)
+    a = np.repeat(np.arange(n**dim), lists.lengths)
     r = x[b] - x[a] - 0.5 * np.einsum("nij,nj->ni", F[a] + F[b], X[b] - X[a])
     squares, total = (np.bincount(a, w * value, n**dim) for value in ((r**2).sum(axis=1), np.ones(len(a))))
     np.testing.assert_allclose(simulation.mismatch, np.sqrt(squares / total) * n, rtol=1e-12)

@@ -21,9 +21,9 @@ def simulation(x, tilt=es.Tilt(), dtype=wp.float64, tie=None, velocity=None, **o
 
 def rows(configuration):
     """Both ends, ξ, w_ab t_ab and w_ab t_ba of every directed pair, in numpy."""
-    x, near = configuration.fields.x.numpy().astype(float), configuration.near
-    a = np.repeat(np.arange(len(x)), np.diff(near.start.numpy()))
-    b, w, own = near.index.numpy(), near.w.numpy().astype(float), near.own.numpy().astype(float)
+    x, near, lists = configuration.fields.x.numpy().astype(float), configuration.near, configuration.lists
+    a = np.repeat(np.arange(len(x)), lists.lengths)
+    b, w, own = lists.of_pairs(near.index), lists.of_pairs(near.w).astype(float), lists.of_pairs(near.own).astype(float)
     return a, b, x[b] - x[a], own, 2.0 * w - own
 
 
@@ -74,7 +74,8 @@ def test_third_moments_vanish_where_the_bound_lets_them(dim):
         weighted = (w * (xi**2).sum(axis=1))[:, None] * xi
         return np.stack([np.bincount(a, column, n) for column in weighted.T], axis=1)
 
-    untilted = simulation(block(dim), tilt=None).configuration.near.w.numpy()
+    plain = simulation(block(dim), tilt=None).configuration
+    untilted = plain.lists.of_pairs(plain.near.w)
     scale = np.bincount(a, untilted * np.linalg.norm(xi, axis=1) ** 3, n)
     before, after = (np.linalg.norm(moment(w), axis=1) / scale for w in (untilted, own))
     # μ from the two weights of a pair: ln(own/w) = −μ·ξ, by least squares over the row
@@ -95,7 +96,7 @@ def test_inside_a_lattice_nothing_is_tilted():
     made, plain = simulation(x).configuration, simulation(x, tilt=None).configuration
     a, _, _, own, dual = rows(made)
     deep = (np.abs(x - 8.0).max(axis=1) < 2.5)[a]
-    np.testing.assert_array_equal(own[deep], plain.near.w.numpy()[deep])
+    np.testing.assert_array_equal(own[deep], plain.lists.of_pairs(plain.near.w)[deep])
     np.testing.assert_array_equal(dual[deep], own[deep])
 
 

@@ -190,7 +190,7 @@ def check_neighbourhoods(world: World, bodies: Sequence[Body]) -> None:
             )
         poor = np.flatnonzero(configuration.poor.numpy())
         if poor.size:
-            neighbours = np.diff(configuration.near.start.numpy())[poor[0]]
+            neighbours = configuration.lists.lengths[poor[0]]
             raise ValueError(
                 f"the neighbours of a particle must span all {world.space.dim} directions, {poor.size} particles lack "
                 f"some; the first is {who(first + int(poor[0]))} with {neighbours} neighbours within "

@@ -109,7 +109,7 @@ def _make_mismatch(space: Space, fixed: bool) -> wp.Kernel:
         a = first + wp.tid()
         X_a, u_a, H_a = reference.x[a], state.x[a] - reference.x[a], strain(a, state, reference)
         total = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             half = (H_a + strain(b, state, reference)) * real(0.5)
             r = state.x[b] - reference.x[b] - u_a - half @ separation(reference.x[b], X_a, near.box)

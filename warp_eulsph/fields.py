@@ -129,7 +129,9 @@ def part_of(array: wp.array, span: range) -> wp.array:
 
 @functools.cache
 def neighbour_structure(space: Space) -> Any:
-    """Compressed rows of neighbours: row a is ``index[start[a]:start[a+1]]``, sorted, without a itself.
+    """Rows of neighbours: row a is ``index[start[a]:stop[a]:stride]``, sorted, without a itself.
+
+    SIMD kernels have them one behind another (``stride`` 1, ``stop[a] = start[a+1]``), GPUs in slices of 32.
 
     ``w`` is V_b g_ab [1/m²] with g_ab = −W'(r)/r, so that V_b ∇W_ab = w_ab (x_b − x_a). M3 and M4 take ``own``, M5 the
     same of the other end, which is 2 w − own; both are w, and ``own`` the same array, unless the weights are tilted
@@ -139,6 +141,8 @@ def neighbour_structure(space: Space) -> Any:
     @wp.struct
     class Neighbours:
         start: wp.array(dtype=wp.int32)
+        stop: wp.array(dtype=wp.int32)
+        stride: int
         index: wp.array(dtype=wp.int32)
         w: wp.array(dtype=space.real)
         own: wp.array(dtype=space.real)

@@ -75,9 +75,11 @@ class ForceArrays(Protocol):
 
 
 class NeighbourRows(Protocol):
-    """Struct ``Neighbours``: compressed rows with their weights; ``box`` is a vector."""
+    """Struct ``Neighbours``: rows with their weights; ``box`` is a vector."""
 
     start: wp.array
+    stop: wp.array
+    stride: int
     index: wp.array
     w: wp.array
     own: wp.array

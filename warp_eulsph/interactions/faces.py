@@ -115,7 +115,7 @@ def make_outward(space: Space) -> wp.Kernel:
         if flowing[a] == 1:
             return
         total = vec()
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             total -= near.w[k] * separation(reference.x[near.index[k]], reference.x[a], near.box)
         outward[a] = total * (real(2.0) * reference.V[a])
 
@@ -156,7 +156,7 @@ def make_find(space: Space) -> wp.Kernel:
             around = int(0)
             reach = real(0.0)
             lean = vec()
-            for k in range(near.start[a], near.start[a + 1]):
+            for k in range(near.start[a], near.stop[a], near.stride):
                 away = separation(reference.x[near.index[k]], reference.x[a], near.box) / particles.spacing[a]
                 height = wp.dot(away, n)
                 if height > real(wp.static(LEAST_HEIGHT - 0.1)) and wp.length(away) < real(HEIGHT):
@@ -208,7 +208,7 @@ def plane_moments(space: Space) -> wp.Function:
         total = weight_of(real(0.0), h)
         mean = vec()
         square = mat()
-        for i in range(near.start[a], near.start[a + 1]):
+        for i in range(near.start[a], near.stop[a], near.stride):
             b = near.index[i]
             if outermost[b] == 1 and alike(outward[a], outward[b]):
                 w = weight_of(wp.length(separation(reference.x[b], reference.x[a], near.box)), h)

@@ -49,7 +49,7 @@ def make_beside(space: Space) -> wp.Kernel:
         k = first + wp.tid()
         c = members[k] - offset
         found = wanted[c]
-        for i in range(near.start[c], near.start[c + 1]):
+        for i in range(near.start[c], near.stop[c], near.stride):
             found = wp.max(found, wanted[near.index[i]])
         beside[k] = found * outermost[c]
 
@@ -159,7 +159,7 @@ def stretched_plane(space: Space) -> wp.Function:
         mass: real,
     ):
         A = mat()
-        for i in range(near.start[a], near.start[a + 1]):
+        for i in range(near.start[a], near.stop[a], near.stride):
             b = near.index[i]
             if outermost[b] == 1 and alike(outward[a], outward[b]):
                 apart = separation(reference.x[b], reference.x[a], near.box)
@@ -335,7 +335,7 @@ def make_turn(space: Space, fixed: bool) -> wp.Kernel:
             if wanted[c] == 1:  # less what its move does to all others of its plane
                 w = weight_of(real(0.0), real(REACH) * particles.spacing[c])
                 force -= levers[c] @ (centres[c] * (real(0.5) * masses[c] - w))
-            for i in range(near.start[c], near.start[c + 1]):
+            for i in range(near.start[c], near.stop[c], near.stride):
                 a = near.index[i]
                 if wanted[a] == 1 and alike(outward[a], outward[c]):
                     apart = separation(reference.x[c], reference.x[a], near.box)

@@ -38,7 +38,7 @@ def make_average(weight: Weight, space: Space, components: int) -> wp.Kernel:
         alpha_a, beta_a = alpha[a], beta[a]
         total = row()
         share = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             offset = separation(x_a, reference.x[b], near.box)
             W = W_of(wp.length(offset), real(0.5) * (h_a + reference.h[b]))

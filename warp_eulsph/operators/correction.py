@@ -35,7 +35,7 @@ def make_pair_sums(weight: Weight, space: Space) -> wp.Kernel:
         K_a = mat()
         row = real(0.0)
         diagonal = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
             g = g_of(wp.length(xi), real(0.5) * (h_a + reference.h[b]))

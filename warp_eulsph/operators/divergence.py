@@ -43,7 +43,7 @@ def make_tilted_divergence(space: Space) -> wp.Kernel:
         a = first + wp.tid()
         x_a = reference.x[a]
         total = Pi[a] @ reference.moment[a]
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             dual = near.w[k] + (near.w[k] - near.own[k])
             total += Pi[b] @ (separation(reference.x[b], x_a, near.box) * dual)

@@ -43,7 +43,7 @@ def make_gradient(space: Space, components: int, simd: bool = False) -> wp.Kerne
         x_a = reference.balanced[a]
         f_a = f[a]
         sums = row_gradient()
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             xi = separation(reference.balanced[b], x_a, near.box)
             sums += wp.outer(f[b] - f_a, xi * near.own[k])

@@ -35,7 +35,7 @@ def make_interpolate(weight: Weight, space: Space, components: int, transpose: b
         x_a, h_a, V_a = reference.x[a], reference.h[a], reference.V[a]
         alpha_a, beta_a = alpha[a], beta[a]
         total = f[a] * (V_a * alpha_a * W_of(real(0.0), h_a))
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             offset = separation(x_a, reference.x[b], near.box)
             W = W_of(wp.length(offset), real(0.5) * (h_a + reference.h[b]))
@@ -75,7 +75,7 @@ def make_mass_diagonals(weight: Weight, space: Space) -> wp.Kernel:
         N = V_a * alpha[a] * W_of(real(0.0), h_a)
         lumped_a = particles.mass[a] * N
         consistent_a = lumped_a * N
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             c = near.index[k]
             offset = separation(reference.x[c], x_a, near.box)
             W = W_of(wp.length(offset), real(0.5) * (h_a + reference.h[c]))

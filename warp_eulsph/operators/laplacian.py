@@ -31,7 +31,7 @@ def _make_apply(space: Space) -> wp.Kernel:
         f_a = f[a]
         total = vec()
         weights = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             omega = near.w[k]
             weights += omega

@@ -1,4 +1,4 @@
-"""Neighbour lists: ``wp.HashGrid`` once per reference, then compressed rows that every sum walks."""
+"""Neighbour lists: a search once per reference, then rows that every sum walks."""
 
 import functools
 import logging
@@ -14,6 +14,7 @@ from ..space import Space, difference, vector_type
 from ..structs import NeighbourRows
 from ..weights import Weight
 from .cells import Cells
+from .slices import SLICE, Slices, places_taken
 
 log = logging.getLogger(__name__)
 
@@ -66,6 +67,7 @@ def _make_search(space: Space, fill: bool) -> wp.Kernel:
         h_max: wp.array(dtype=real),
         count: wp.array(dtype=wp.int32),
         start: wp.array(dtype=wp.int32),
+        stride: int,
         index: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
@@ -100,10 +102,10 @@ def _make_search(space: Space, fill: bool) -> wp.Kernel:
                                 r = wp.length(separation(x[b], x[a], box))
                                 if nearest and r < support * real(0.5) * (h[a] + h[b]):
                                     if wp.static(fill):
-                                        k = row + n
-                                        while k > row and index[k - 1] > b:
-                                            index[k] = index[k - 1]
-                                            k = k - 1
+                                        k = row + n * stride
+                                        while k > row and index[k - stride] > b:
+                                            index[k] = index[k - stride]
+                                            k = k - stride
                                         index[k] = b
                                     n = n + 1
         if wp.static(not fill):
@@ -185,6 +187,9 @@ class NeighbourLists:
         self.rows: NeighbourRows = neighbour_structure(space)()
         self.rows.box = self.box
         self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        self._slices = None if self._in_cells else Slices(n, device)
+        self.rows.stride = 1 if self._slices is None else SLICE
+        self.rows.stop = self.rows.start[1:] if self._slices is None else wp.zeros(n, dtype=wp.int32, device=device)
         self._waiting = wp.zeros(1, dtype=wp.int32, device=device)
         self._total, self._h_max = self.rows.start[n:], wp.zeros(1, dtype=space.real, device=device)
         self._builds = 0
@@ -210,20 +215,36 @@ class NeighbourLists:
 
     @property
     def capacity(self) -> int:
-        """Pairs that fit without growing."""
+        """Places for pairs that there are."""
         return len(self.rows.index)
 
     @property
-    def pairs(self) -> int:
-        """Directed pairs (a, b) in the lists; reads the device.
+    def room(self) -> int:
+        """Places that the rows take: their pairs, and in slices what fills rows up; reads the device.
 
         Raises:
             ValueError: more than can be numbered.
         """
-        pairs = int(self._total.numpy()[0])
-        if pairs < 0:  # the sum of the counts ran over
+        room = int(self._total.numpy()[0])
+        if room < 0:  # the sum of the counts ran over
             raise ValueError(self._too_many(2.0**31))
-        return pairs
+        return room
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Neighbours of each particle, (n,); reads the device."""
+        return (self.rows.stop.numpy() - self.rows.start.numpy()[:-1]) // self.rows.stride
+
+    @property
+    def pairs(self) -> int:
+        """Directed pairs (a, b) in the lists; reads the device."""
+        return int(self.lengths.sum()) if self.room else 0
+
+    def of_pairs(self, array: wp.array) -> np.ndarray:
+        """``rows.index``, ``w`` or ``own`` row by row without what fills slices up, (pairs,); reads the device."""
+        lengths = self.lengths
+        behind = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+        return array.numpy()[np.repeat(self.rows.start.numpy()[:-1], lengths) + self.rows.stride * behind]
 
     @property
     def waiting(self) -> bool:
@@ -240,7 +261,7 @@ class NeighbourLists:
         """Find the neighbours in configuration ``x`` [m], (n,) of vec; ``rows.w`` is left to be computed."""
         self.count_neighbours(x)
         self.sum_counts()
-        if self.pairs > self.capacity:  # not where the rows of before are found again, in whatever order
+        if self.room > self.capacity:  # not where the rows of before are found again, in whatever order
             self.make_room()
         self.fill(x)
 
@@ -264,8 +285,11 @@ class NeighbourLists:
         self._search(x, fill=False)
 
     def sum_counts(self) -> None:
-        """Where each row begins; may be repeated."""
-        wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
+        """Where each row begins and stops; may be repeated."""
+        if self._slices is None:
+            wp.utils.array_scan(self.count, self.rows.start, inclusive=False)
+        else:
+            self._slices.lay(self.count, self.rows)
 
     def check_room(self, running: wp.array) -> None:
         """Stop a batch of steps (``running`` ← 0) when the lists have no room for the rows; launches only."""
@@ -279,13 +303,14 @@ class NeighbourLists:
             ValueError: a periodic box shorter than twice the support radius, or more pairs than can be numbered.
         """
         self._measure()
-        pairs = int(self.count.numpy()[:-1].sum(dtype=np.int64))  # exactly: the sum on the device may have run over
-        if pairs > MOST_PAIRS:
-            raise ValueError(self._too_many(pairs))
+        lengths = self.count.numpy()[:-1]  # exactly: the sum on the device may have run over
+        room = int(lengths.sum(dtype=np.int64)) if self._slices is None else places_taken(lengths)
+        if room > MOST_PAIRS:
+            raise ValueError(self._too_many(room))
         # Exactly what the first configuration needs, which may be the only one; from the second on a quarter more than
         # needed, so that a moving reference grows its lists seldom.
-        if pairs > self.capacity or self._builds == 1:
-            self._reserve(pairs + (pairs // 4 if self._builds else 0))
+        if room > self.capacity or self._builds == 1:
+            self._reserve(room + (room // 4 if self._builds else 0))
             log.debug("neighbour lists grew to %d pairs", self.capacity)
         self._waiting.zero_()
         self._builds += 1
@@ -318,5 +343,5 @@ class NeighbourLists:
             return
         assert self.grid is not None  # one or the other is made
         arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self._h_max]
-        arguments += [self.count, self.rows.start, self.rows.index]
+        arguments += [self.count, self.rows.start, self.rows.stride, self.rows.index]
         self._launch(_make_search(self.space, fill), len(x), arguments)

@@ -23,7 +23,7 @@ def laplacian_sum(space: Space, simd: bool) -> wp.Function:
         def laplacian_sum(a: int, near: Neighbours, f: wp.array(dtype=vec), diagonal: wp.array(dtype=real)):
             f_a = f[a]
             total = vec()
-            for k in range(near.start[a], near.start[a + 1]):
+            for k in range(near.start[a], near.stop[a], near.stride):
                 total += (f[near.index[k]] - f_a) * near.w[k]
             return total
 
@@ -66,7 +66,7 @@ def outer_sum(space: Space, simd: bool, of_positions: bool) -> wp.Function:
         def outer_sum(a: int, near: Neighbours, f: wp.array(dtype=vec), x: wp.array(dtype=vec)):
             f_a, x_a = f[a], x[a]
             sums = mat()
-            for k in range(near.start[a], near.start[a + 1]):
+            for k in range(near.start[a], near.stop[a], near.stride):
                 b = near.index[k]
                 df = f[b] - f_a
                 if wp.static(of_positions):
@@ -131,7 +131,7 @@ def flux_sum(space: Space, simd: bool) -> wp.Function:
         def flux_sum(a: int, near: Neighbours, Q: wp.array(dtype=mat), x: wp.array(dtype=vec)):
             Q_a, x_a = Q[a], x[a]
             total = vec()
-            for k in range(near.start[a], near.start[a + 1]):
+            for k in range(near.start[a], near.stop[a], near.stride):
                 b = near.index[k]
                 total += (Q_a + Q[b]) @ (separation(x[b], x_a, near.box) * near.w[k])
             return total

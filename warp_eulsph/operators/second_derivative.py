@@ -35,7 +35,7 @@ def make_second_derivative(space: Space, components: int) -> wp.Kernel:
         gradient_a = gradient[a]
         sums = row()
         trace = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
             sums += (f[b] - f_a - gradient_a @ xi) * near.w[k]

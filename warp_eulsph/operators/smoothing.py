@@ -39,7 +39,7 @@ def make_linear_exact(space: Space, components: int) -> wp.Kernel:
         gradient_a = gradient[a]
         row_a = reference.row[a]
         change = row()
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
             omega = particles.mass[b] / reference.V[b] * near.w[k] / wp.max(row_a, reference.row[b])

@@ -60,7 +60,7 @@ def make_value_correction(weight: Weight, space: Space, linear: bool) -> wp.Kern
         M_0 = reference.V[a] * W_of(real(0.0), h_a)
         M_1 = vec()
         M_2 = mat()
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             # In units of h, so that the cut-off of the inverse is dimensionless
             offset = separation(x_a, reference.x[b], near.box) / h_a

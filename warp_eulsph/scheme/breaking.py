@@ -73,7 +73,7 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
         moment = vec()
         diagonal = real(0.0)
         lost = int(0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             if near.w[k] != real(0.0) and (cut[a] != 0 or cut[b] != 0):
                 near.own[k] = real(0.0)

@@ -93,12 +93,42 @@ def jump_between(space: Space, sensed: bool) -> wp.Function:
 
 
 @functools.cache
-def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
-    """Kernel: D_a of M9; antisymmetric in the pair."""
+def upwind_between(space: Space, sensed: bool) -> wp.Function:
+    """``wp.func`` D_ab of M9 [N]: the force on a from b, which stands at k in the lists; antisymmetric."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     Neighbours = neighbour_structure(space)
     separation, pair_force, jump_of = difference(space), upwind(space), jump_between(space, sensed)
+
+    @wp.func
+    def upwind_between(
+        a: int,
+        k: int,
+        reference: Reference,
+        near: Neighbours,
+        flux: Flux,
+        x: wp.array(dtype=vec),
+        v: wp.array(dtype=vec),
+        grad_v: wp.array(dtype=mat),
+        epsilon: real,
+        sensor: wp.array(dtype=vec),
+    ) -> vec:
+        b = near.index[k]
+        xi = separation(reference.x[b], reference.x[a], near.box)
+        jump = jump_of(v[b] - v[a], grad_v[a] + grad_v[b], xi, epsilon, sensor[a], sensor[b])
+        Z, Z_shear = flux.impedance[a] + flux.impedance[b], flux.shear_impedance[a] + flux.shear_impedance[b]
+        now = separation(x[b], x[a], near.box)
+        return pair_force(xi, now, reference.V[a] * near.w[k], Z, Z_shear, jump)
+
+    return upwind_between
+
+
+@functools.cache
+def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
+    """Kernel: D_a of M9."""
+    real, vec, mat = space.real, space.vec, space.mat
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
+    Neighbours, pair_force = neighbour_structure(space), upwind_between(space, sensed)
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate(
@@ -114,20 +144,9 @@ def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
         out: wp.array(dtype=vec),
     ):
         a = first + wp.tid()
-        x_a = reference.x[a]
-        V_a = reference.V[a]
-        v_a = v[a]
-        grad_a = grad_v[a]
-        Z_a = flux.impedance[a]
-        Z_shear_a = flux.shear_impedance[a]
         force = vec()
-        for k in range(near.start[a], near.start[a + 1]):
-            b = near.index[k]
-            xi = separation(reference.x[b], x_a, near.box)
-            jump = jump_of(v[b] - v_a, grad_a + grad_v[b], xi, epsilon, sensor[a], sensor[b])
-            Z, Z_shear = Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b]
-            now = separation(x[b], x[a], near.box)
-            force += pair_force(xi, now, V_a * near.w[k], Z, Z_shear, jump)
+        for k in range(near.start[a], near.stop[a], near.stride):
+            force += pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
         out[a] = force
 
     return dissipate

@@ -69,7 +69,7 @@ def _make_beside(space: Space, apart: bool) -> wp.Kernel:
     ):
         a = first + wp.tid()
         found = exposed[a]
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             if exposed[b] != 0:
                 found = 1

@@ -9,9 +9,9 @@ from ..execution import Launcher
 from ..fields import clock_structure, neighbour_structure, structure
 from ..materials import Law
 from ..materials.base import history_row
-from ..space import Space, difference
+from ..space import Space
 from ..structs import ClockArrays, ParticleArrays
-from .dissipation import jump_between, upwind
+from .dissipation import upwind_between
 from .flux import Flux
 from .shifting import NO_BOUND
 from .stabiliser import Sums
@@ -25,8 +25,7 @@ def _make_heat(space: Space, sensed: bool) -> wp.Kernel:
     """
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux, Clock = structure(space, "Reference"), structure(space, "Flux"), clock_structure(space)
-    Neighbours = neighbour_structure(space)
-    separation, pair_force, jump_of = difference(space), upwind(space), jump_between(space, sensed)
+    Neighbours, pair_force = neighbour_structure(space), upwind_between(space, sensed)
 
     @wp.kernel(module="unique", enable_backward=False)
     def heat(
@@ -47,13 +46,9 @@ def _make_heat(space: Space, sensed: bool) -> wp.Kernel:
         a = first + wp.tid()
         mean_a = v_old[a] + v_new[a]  # twice
         lost = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
-            xi = separation(reference.x[b], reference.x[a], near.box)
-            jump = jump_of(v[b] - v[a], grad_v[a] + grad_v[b], xi, epsilon, sensor[a], sensor[b])
-            Z, Z_shear = flux.impedance[a] + flux.impedance[b], flux.shear_impedance[a] + flux.shear_impedance[b]
-            now = separation(x[b], x[a], near.box)
-            force = pair_force(xi, now, reference.V[a] * near.w[k], Z, Z_shear, jump)
+            force = pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
             lost += wp.dot(force, v_old[b] + v_new[b] - mean_a)
         out[a] = lost * real(0.25) * real(clock.dt[0])
 

@@ -10,9 +10,9 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..operators.laplacian import LaplacianSolver
 from ..reduce import Sum
-from ..space import Space, difference
+from ..space import Space
 from ..structs import ParticleArrays, StateArrays
-from .dissipation import UpwindForces, jump_between, upwind
+from .dissipation import UpwindForces, upwind_between
 from .flux import Flux
 from .reference import Configuration
 from .stabiliser import Correction, Stabiliser, Sums
@@ -84,8 +84,7 @@ def _make_dissipate(space: Space, sensed: bool) -> wp.Kernel:
     """Kernel: M9, and from the powers of M9 and of M11 in the particle's pairs what M12 admits, R_a."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Flux, Neighbours = structure(space, "Reference"), structure(space, "Flux"), neighbour_structure(space)
-    separation, pair_force, share = difference(space), upwind(space), admitted(space)
-    jump_of = jump_between(space, sensed)
+    pair_force, share = upwind_between(space, sensed), admitted(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def dissipate_and_budget(
@@ -104,24 +103,18 @@ def _make_dissipate(space: Space, sensed: bool) -> wp.Kernel:
         admission: wp.array(dtype=real),
     ):
         a = first + wp.tid()
-        x_a, V_a, v_a, grad_a = reference.x[a], reference.V[a], v[a], grad_v[a]
-        Z_a, Z_shear_a, Q_a, psi_a = flux.impedance[a], flux.shear_impedance[a], flux.Q[a], psi[a]
+        V_a, v_a, Q_a, psi_a = reference.V[a], v[a], flux.Q[a], psi[a]
         dissipation = vec()
         fed = real(0.0)
         taken = real(0.0)
         dissipated = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
-            xi = separation(reference.x[b], x_a, near.box)
-            VVg = V_a * near.w[k]
             plain = v[b] - v_a
-            jump = jump_of(plain, grad_a + grad_v[b], xi, epsilon, sensor[a], sensor[b])
-            now = separation(x[b], x[a], near.box)
-            Z, Z_shear = Z_a + flux.impedance[b], Z_shear_a + flux.shear_impedance[b]
-            upwind_ab = pair_force(xi, now, VVg, Z, Z_shear, jump)
+            upwind_ab = pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
             dissipation += upwind_ab
             dissipated += wp.dot(upwind_ab, plain)
-            p_ab = -wp.dot((Q_a + flux.Q[b]) @ (psi_a - psi[b]), plain) * real(0.5) * VVg
+            p_ab = -wp.dot((Q_a + flux.Q[b]) @ (psi_a - psi[b]), plain) * real(0.5) * (V_a * near.w[k])
             fed += wp.max(p_ab, real(0.0))
             taken += wp.max(-p_ab, real(0.0))
         out[a] = dissipation
@@ -150,7 +143,7 @@ def _make_correct(space: Space, limited: bool) -> wp.Kernel:
         a = first + wp.tid()
         V_a, v_a, Q_a, psi_a = reference.V[a], v[a], Q[a], psi[a]
         correction = vec()
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             f_ab = (Q_a + Q[b]) @ ((psi_a - psi[b]) * (real(0.5) * V_a * near.w[k]))
             if wp.static(limited) and wp.dot(f_ab, v[b] - v_a) < real(0.0):

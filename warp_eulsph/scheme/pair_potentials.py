@@ -274,7 +274,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
         a = first + wp.tid()
         tie, drag, tied, dragged = vec(), vec(), mat(), mat()
         held, modulus = real(0.0), moduli[particles.body[a] - particles.body[0]]
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             xi = separation(reference.x[b], reference.x[a], near.box)
             # by displacements: in a periodic box the nearest image of a strained pair may be another

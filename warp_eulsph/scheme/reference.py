@@ -125,7 +125,7 @@ def _make_nearest(space: Space) -> wp.Kernel:
     def find_nearest(first: int, reference: Reference, near: Neighbours, nearest: wp.array(dtype=real)):
         a = first + wp.tid()
         least = real(wp.inf)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             least = wp.min(least, wp.length(separation(reference.x[near.index[k]], reference.x[a], near.box)))
         nearest[a] = least
 
@@ -259,8 +259,9 @@ class Configuration:
             self._launch(_make_resolve(self.space), len(self.K), [self.particles, self.fields, self._steeper])
 
     def _weigh(self) -> None:
-        pair_sums = (make_pair_sums_simd if self.simd else make_pair_sums)(self.weight, self.space)
-        self._launch(pair_sums, len(self.K), [self.particles, self.fields, self.near, self.K])
+        by_simd = self.simd and self.weight.slope_cpp is not None
+        make = make_pair_sums_simd if by_simd else make_pair_sums
+        self._launch(make(self.weight, self.space), len(self.K), [self.particles, self.fields, self.near, self.K])
         for interpolation in self._interpolations.values():
             interpolation.refresh()
 

@@ -94,7 +94,7 @@ def _make_sense(space: Space, dimensionless: bool) -> wp.Kernel:
     ):
         a = first + wp.tid()
         largest = wp.abs(curvature[a])
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             largest = wp.max(largest, wp.abs(curvature[near.index[k]]))
         d_a = vec()
         for i in range(wp.static(dim)):

@@ -47,7 +47,7 @@ def turned_sum(space: Space, simd: bool, dual: bool) -> wp.Function:
         def turned_sum(a: int, near: Neighbours, rows: wp.array2d(dtype=real), x: wp.array(dtype=vec)):
             x_a = x[a]
             sums = mat()
-            for k in range(near.start[a], near.start[a + 1]):
+            for k in range(near.start[a], near.stop[a], near.stride):
                 b = near.index[k]
                 xi = separation(x[b], x_a, near.box)
                 turned = vec()

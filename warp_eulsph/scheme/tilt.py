@@ -103,7 +103,7 @@ def make_tilt(space: Space) -> wp.Kernel:
             total, scale = real(0.0), real(0.0)
             moment = vec()
             square = mat()
-            for k in range(near.start[a], near.start[a + 1]):
+            for k in range(near.start[a], near.stop[a], near.stride):
                 xi = separation(reference.x[near.index[k]], reference.x[a], near.box) / particles.spacing[a]
                 e = near.w[k] * wp.dot(xi, xi) * wp.exp(-wp.dot(mu, xi))
                 total += e
@@ -137,7 +137,7 @@ def make_tilted_sums(space: Space) -> wp.Kernel:
         K = mat()
         moment = vec()
         diagonal = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             xi = separation(reference.x[b], x_a, near.box)
             own = near.w[k] * wp.exp(-wp.dot(mu_a, xi))

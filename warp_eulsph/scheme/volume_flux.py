@@ -53,7 +53,7 @@ def _make_exchange(space: Space) -> wp.Kernel:
     ):
         a = first + wp.tid()
         flow = real(0.0)
-        for k in range(near.start[a], near.start[a + 1]):
+        for k in range(near.start[a], near.stop[a], near.stride):
             b = near.index[k]
             xi = separation(reference.x[b], reference.x[a], near.box)
             both = flux.impedance[a] + flux.impedance[b]

@@ -38,8 +38,8 @@ def spectrum(dim: int, dilation: float = 1.3) -> Spectrum:
     body = Body(x=x, volume=volume, material=NeoHookean(density=1.0, young=1.0, poisson=0.3), surface=0.0)
     simulation = Simulation(body, periodic=(1.0,) * dim, dilation=dilation, arrangement=Current(), sort=False)
     configuration = simulation.configuration
-    start, near = configuration.near.start.numpy(), configuration.near
-    row = slice(int(start[0]), int(start[1]))
+    near = configuration.near
+    row = slice(int(near.start.numpy()[0]), int(near.stop.numpy()[0]), near.stride)
     places = np.rint(n * (x[near.index.numpy()[row]] - x[0])).astype(int) % n
     weights = np.zeros((n,) * dim)
     np.add.at(weights, tuple(places.T), near.w.numpy()[row])

@@ -12,13 +12,14 @@ from ..space import Space
 class Weight(ABC):
     """Radial weight W(r, h) = σ_d / h^d · w(q), q = r/h, zero from q = ``support`` on.
 
-    A new weight is one file: ``support``, ``sigma`` for 1-D, 2-D, 3-D, and ``profile``.
+    A new weight is one file: ``support``, ``sigma`` for 1-D, 2-D, 3-D, ``profile``, and ``slope_cpp`` for speed.
     """
 
     support: ClassVar[float]
     sigma: ClassVar[tuple[float, float, float]]
     #: −w'(q)/q once more, in C++ for SIMD kernels: an expression of the vector q, of type V with components of type T.
-    slope_cpp: ClassVar[str]
+    #: None leaves that pass to the portable kernel.
+    slope_cpp: ClassVar[str | None] = None
 
     @abstractmethod
     def profile(self, real: type) -> tuple[wp.Function, wp.Function]:
