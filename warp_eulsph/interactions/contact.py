@@ -1,5 +1,6 @@
 """Contact of bodies, and of a body with itself: they push where they touch, and do not pass through."""
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,11 +19,13 @@ from .friction import make_slip
 from .law import make_give, make_push, make_raise, make_rate, skin_structure
 from .moved import Moved
 from .nearby import Nearby, matter_structure
-from .skin import Skin
+from .skin import Skin, flowing
 from .wetting_solids import find_wettings
 
 if TYPE_CHECKING:
     from ..scheme.world import World
+
+_log = logging.getLogger(__name__)
 
 # Least distance of particles of two bodies at the start, in spacings: faces that touch have 1, or more.
 APART = 0.9
@@ -44,8 +47,7 @@ class Contact(Interaction):
 
     A body whose arrangement stays that of the start touches itself, too, where it folds, is crushed, or a notch closes:
     matter that neither feels each other by weights nor would by this law at the start. Where the arrangement is read
-    anew what meets becomes neighbours. Bodies that may break (``Failing``) do not touch themselves, nor do those that
-    are one medium with them.
+    anew what meets becomes neighbours. Where it breaks (``Failing``), what lost its pairs touches what it lost.
 
     Args:
         between: pairs of names of bodies that touch each other, ("ring", "ring") for one that touches itself; all with
@@ -132,18 +134,20 @@ class BoundContact(BoundInteraction):
             self._measure(world, world.U)
 
     def _leave_out_moving(self, world: "World") -> None:
-        """Bodies whose arrangement is read anew, or that may break, do not touch themselves."""
+        """Bodies whose arrangement is read anew do not touch themselves."""
         names = list(self.assembly.bodies)
         fixed = np.concatenate([np.full(medium.n, medium.configuration.fixed) for medium in world.media])
-        fixed &= np.concatenate([np.full(medium.n, medium.breaking is None) for medium in world.media])
         stays = fixed[[own.start for own in self.assembly.bodies.values()]]
         moving = [names[k] for k in np.flatnonzero((np.diag(self._felt) == 2) & ~stays)]
         if moving and self.option.between is not None:
             raise ValueError(
-                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew, or "
-                "may break; what meets there becomes neighbours. Leave them out of between, or build with "
-                "arrangement=Convected() and matter that does not break"
+                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew; "
+                "what meets there becomes neighbours. Leave them out of between, or build with arrangement=Convected()"
             )
+        flows = np.concatenate([flowing(medium) for medium in world.media])
+        solids = [name for name in moving if not flows[self.assembly.bodies[name].start]]
+        if solids:
+            _log.info("Contact: %s read their arrangement anew and do not touch themselves; use Convected() there", solids)
         self._felt[(self._felt == 2) & ~stays] = 0
         if not self._felt.any():
             raise ValueError(
@@ -155,6 +159,7 @@ class BoundContact(BoundInteraction):
         order, indices, device = self.assembly.order, self.skin.indices, world.device
         support = np.concatenate([np.full(medium.n, medium.configuration.lists.support) for medium in world.media])
         matter = matter_structure(self.space)()
+        matter.torn = self.skin.torn
         for name, values in {
             "X": self.assembly.X,
             "outward": order.by_number(world.particles.outward.numpy()),
@@ -281,6 +286,7 @@ class BoundContact(BoundInteraction):
                 "there": self.skin.there,
                 "area": self.skin.area,
                 "bend": self.skin.bend,
+                "torn": self.skin.torn,
                 "given": self._arrays.given,
             }
         for k, wetting in enumerate(self._wettings):

@@ -19,6 +19,15 @@ if TYPE_CHECKING:
     from ..scheme.world import World
 
 
+def flowing(medium: "Medium") -> np.ndarray:
+    """Which particles of a medium flow, (n,) int32: they change places all the time."""
+    flows = np.zeros(medium.n, dtype=np.int32)
+    for part in medium.flux.parts:
+        moves = not medium.configuration.fixed and part.law.update is not None and part.law.rebase is None
+        flows[part.first : part.first + part.size] = moves
+    return flows
+
+
 class _Layer:
     """The skin of one medium; its outermost particles are those of the reference.
 
@@ -33,18 +42,15 @@ class _Layer:
         n = medium.n
         self.outermost = wp.zeros(n, dtype=wp.int32, device=device)
         fixed, exact = medium.configuration.fixed, medium.surface_given
-        flowing = np.zeros(n, dtype=np.int32)
-        for part in medium.flux.parts:
-            flows = not fixed and part.law.update is not None and part.law.rebase is None
-            flowing[part.first : part.first + part.size] = flows
-        self._flowing = wp.array(flowing, dtype=wp.int32, device=device)
+        flows = flowing(medium)
+        self._flowing = wp.array(flows, dtype=wp.int32, device=device)
         self.outward = medium.particles.outward
-        if not fixed and (flowing.any() or not exact):
+        if not fixed and (flows.any() or not exact):
             self.outward = wp.zeros(n, dtype=space.vec, device=device)
         self.breaking = medium.breaking if fixed else None
         self.alone = self._flowing if self.breaking is None else self.breaking.frayed
         self.changes = self.breaking is not None
-        self.changes |= self.outward is not medium.particles.outward and not flowing.all()
+        self.changes |= self.outward is not medium.particles.outward and not flows.all()
         self.least = 0.0 if exact else LARGE
         self._normals, self._centres = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(2))
         self._levers = wp.zeros(n, dtype=space.mat, device=device)
@@ -64,9 +70,10 @@ class _Layer:
             arguments = [self.medium.particles, configuration.fields, configuration.near, self.outward, self.outermost]
             self._launch(make_planes(self.space), n, [*arguments, self._normals, self._centres, self._masses])
 
-    def areas(self, places: wp.array, there: wp.array, came: wp.array, area: wp.array, bend: wp.array) -> None:
-        """The face of each of its particles at ``places``, whether it is outermost, since now, and how flat it lies."""
-        arguments = [*self._of(places), self.outward, self.outermost, self.alone, there, came, area, bend]
+    def areas(self, places: wp.array, *found: wp.array) -> None:
+        """What the skin has of its particles at ``places``: ``there``, ``torn``, ``came``, ``area`` and ``bend``."""
+        cut = self._flowing if self.breaking is None else self.breaking.cut
+        arguments = [*self._of(places), self.outward, self.outermost, self.alone, cut, *found]
         self._launch(make_area(self.space), len(places), arguments)
 
     def normals(self, places: wp.array, state: StateArrays, normal: wp.array, answer: wp.array) -> None:
@@ -118,7 +125,9 @@ class Skin:
         indices: numbers of the particles that are or may be outermost, (k,) int32, ascending.
         places: where they lie, (k,) int32 on the device, kept right.
         bodies: number of the body of each, (k,) int32, on the device.
-        there, came: whether it is outermost, and whether it is since the last ``find``, (k,) int32.
+        there: whether it is outermost, (k,) int32.
+        torn: 1 where it lost pairs to a crack, 2 where it lost all, (k,) int32.
+        came: whether it is outermost, or more torn, since the last ``find``, (k,) int32.
         area: face of each in the reference [m^(d−1)], (k,).
         half: distance from the particle to the surface, half a spacing [m], (k,).
         modulus, shear_modulus: ρ c² of pressure and of shear waves at F = I [Pa], (k,).
@@ -163,7 +172,7 @@ class Skin:
         self.bodies = wp.array(body, dtype=wp.int32, device=device)
         self.half = wp.array(0.5 * spacing, dtype=world.space.real, device=device)
         self.modulus, self.shear_modulus = (wp.array(M, dtype=world.space.real, device=device) for M in moduli.T)
-        self.there, self.came = (wp.zeros(k, dtype=wp.int32, device=device) for _ in range(2))
+        self.there, self.torn, self.came = (wp.zeros(k, dtype=wp.int32, device=device) for _ in range(3))
         self.area, self.bend = (wp.zeros(k, dtype=world.space.real, device=device) for _ in range(2))
         self.normal, self.slope = (wp.zeros(k, dtype=world.space.vec, device=device) for _ in range(2))
         self._beside = wp.full(k, 1, dtype=wp.int32, device=device)
@@ -174,7 +183,7 @@ class Skin:
         self.want(self._all)  # until somebody knows better
 
     def _arrays(self) -> list[wp.array]:
-        of_find = [self.places, self.there, self.came, self.area, self.bend]
+        of_find = [self.places, self.there, self.torn, self.came, self.area, self.bend]
         return [*of_find, self.normal, self.slope, self._answer, self._beside]
 
     @property
@@ -196,8 +205,8 @@ class Skin:
     def find(self) -> None:
         """Which particles are outermost in the present references, and the face of each; launches only."""
         self.find_layers()
-        for layer, (places, there, came, area, bend, *_) in zip(self._layers, self._parts, strict=True):
-            layer.areas(places, there, came, area, bend)
+        for layer, parts in zip(self._layers, self._parts, strict=True):
+            layer.areas(*parts[:6])
 
     def rebuild(self) -> None:
         """Derive what goes by place, after particles changed places; all normals are asked for."""

@@ -122,7 +122,7 @@ class Problem:
 PROBLEMS = (
     Problem("corner on a face", (8, 16), "particles along a side", 5.0, (0.0, 1.0), corner_on_face),
     Problem("face on a face", (8, 16), "particles along a side", 4.0, (0.0, 1.0), face_on_face),
-    Problem("rings", (4, 8), "circles", 25.0, (0.07, 2.0), rings),
+    Problem("rings", (4, 6), "circles", 25.0, (0.07, 2.0), rings),
     Problem("plate between discs", (6, 12), "particles along a radius", 6.0, (0.0, 1.0), plate_between_discs),
 )
 
