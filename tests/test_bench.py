@@ -132,8 +132,8 @@ def test_limits_of_the_machine_are_of_this_world(real):
 def test_cost_of_snapshots_is_measured(capsys):
     """A small block, one snapshot in the run; how long that takes is for a quiet machine to say."""
     figures = snapshot_cost.main(["--side", "12", "--steps", "60", "--rounds", "1"])
-    assert set(figures) == {"step_ms", "stall_ms", "stall_percent", "cost_percent"}
-    assert figures["step_ms"] > 0.0
+    assert set(figures) == {"step_ms", "stall_ms", "stall_percent", "processor_ms", "disk_ms", "cost_percent"}
+    assert figures["step_ms"] > 0.0 and figures["processor_ms"] > figures["disk_ms"] > 0.0
     assert figures["stall_percent"] == pytest.approx(2.0 * figures["stall_ms"] / figures["step_ms"])
     assert "1728 particles" in capsys.readouterr().out
 

@@ -38,7 +38,10 @@ MAX_LINES, MAX_KERNEL_LINES = 400, 60
 # What the command line prints is its result
 FRONT_ENDS = {"cli.py"} | {
     f"bench/{name}.py"
-    for name in ("command", "contact_cost", "equal_error", "many_runs", "mixing", "passes", "release", "snapshot_cost")
+    for name in (
+        *("command", "contact_cost", "equal_error", "many_runs", "memory", "mixing", "passes", "release"),
+        "snapshot_cost",
+    )
 }
 FRONT_ENDS |= {
     f"validation/{name}.py" for name in ("command", "punch_elements", "step_cost", "balance_sweeps", "coarse", "rods")

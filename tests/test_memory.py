@@ -9,6 +9,7 @@ from bodies import block
 
 import warp_eulsph as es
 from warp_eulsph import execution, memory
+from warp_eulsph.bench.memory import USES, table
 
 SIDE = {1: 4000, 2: 80, 3: 20}
 
@@ -18,14 +19,31 @@ SIDE = {1: 4000, 2: 80, 3: 20}
 @pytest.mark.parametrize("dim", [1, 2, 3])
 @pytest.mark.parametrize("reference", [es.Never(), es.Always()], ids=repr)
 def test_estimate_is_near_what_is_allocated(dim, dtype, reference, simd, device):
-    """Within a fifth: particles at the surface of so small a block have fewer neighbours."""
+    """To a hundredth but for the lists; with them within a tenth, for at the surface there are fewer neighbours."""
     execution.set_simd(simd)
     simulation = es.Simulation(block(dim, SIDE[dim]), reference=reference, arrangement=es.Current(), dtype=dtype)
     simulation.step(3)
     taken = memory.array_bytes(simulation) / len(simulation.x)
     moving = not reference.fixed
     expected = memory.bytes_per_particle(simulation.space, 2.6, moving, device)
-    assert 0.8 * taken < expected < 1.2 * taken
+    assert 0.9 * taken < expected < 1.1 * taken
+    rows = simulation.configuration.lists.rows
+    lists = sum({array.ptr: array.capacity for array in (rows.index, rows.w, rows.own)}.values()) / len(simulation.x)
+    others = memory.bytes_per_particle(simulation.space, 0.0, moving, device)
+    assert others == pytest.approx(taken - lists, rel=0.01)
+
+
+@pytest.mark.of_the_cpu
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_it_is_known_what_each_array_of_a_step_is_for(dim):
+    """The table of ``bench.memory`` is whole, and of nothing that is not there."""
+    simulation = es.Simulation(block(dim, SIDE[dim]), reference=es.Never())
+    simulation.step()
+    lines = table(simulation)
+    assert [names for _, names, uses in lines[:-1] if not uses] == []
+    assert sum(size for size, _, _ in lines) * len(simulation.x) == pytest.approx(memory.array_bytes(simulation))
+    named = {end for _, names, _ in lines for end in USES for name in names.split(", ") if name.endswith(end)}
+    assert named == set(USES)
 
 
 def test_a_fixed_reference_keeps_no_search_and_finds_its_neighbours_again():

@@ -155,7 +155,11 @@ def make_particles(space: Space, media: Sequence[MediumPlan], device: wp.DeviceL
     particles.spacing.assign(spacing)
     particles.share.fill_(1.0)
     particles.body.assign(np.repeat(np.arange(len(counts)), counts))
-    particles.group.assign(np.repeat(groups_of(bodies), counts))
+    groups = groups_of(bodies)
+    if groups == list(range(len(bodies))):  # nothing is bonded
+        particles.group = particles.body
+    else:
+        particles.group.assign(np.repeat(groups, counts))
     return particles
 
 

@@ -32,18 +32,20 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.Devi
     """
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
-    absent = {"Forces.correction", "Forces.external", "Flux.drag", *_OF_YIELDING} | ({"Flux.Pi"} if vectors else set())
+    absent = {"Forces.correction", "Forces.external", "Forces.damping", "Flux.drag", "Particles.group", *_OF_YIELDING}
+    absent |= {"Flux.Pi"} if vectors else set()
     moved = {"Reference.resolution", "Reference.moment", "Flux.tie", "Forces.tie"}
     absent |= moved if moving else {"Reference.F", "Reference.balanced"}
     present = [
         field for group, fields in GROUPS.items() for name, field in fields.items() if f"{group}.{name}" not in absent
     ]
     reals = sum(sizes[field.kind] for field in present) + 2 * d + d * d + d * d + d  # the half step, ∇v, old v
-    ints, doubles = 5, 2 + 2 * 7 / 64  # body, group, number, start, poor; energies, blocks of the books
+    ints, doubles = 5, 2 + 2 * 7 / 64  # body, number, place, start, poor; energies, blocks of the books
     if vectors:
-        reals += LANES * (3 + 2 * d)
-    if not moving:
-        reals += LANES * (d + 1) if vectors else d * d  # Π, spin; ∇v F⁻¹
+        reals += LANES * ((3 if moving else 4) + 2 * d)
+    else:
+        ints += 1  # stop
+        reals += 0 if moving else LANES * d + d * d  # ∇v or Π; ∇v F⁻¹
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1
@@ -130,27 +132,39 @@ def check_memory(space: Space, media: Sequence[tuple[int, float, bool]], device:
 
 def array_bytes(root: Any) -> int:
     """Bytes of all Warp arrays reachable from an object; memory that several arrays share counts once."""
-    spans: list[tuple[int, int]] = []
+    return sum(size for _, size in memory_by_names(root))
+
+
+def memory_by_names(root: Any) -> list[tuple[list[str], int]]:
+    """Blocks of memory in which Warp arrays reachable from an object lie, the names that lead to them and their bytes.
+
+    Most first; arrays that share memory are of one block.
+    """
+    spans: list[tuple[int, int, str]] = []
     seen: set[int] = set()
-    waiting = [root]
+    waiting = [("", root)]
     while waiting:
-        thing = waiting.pop()
+        name, thing = waiting.pop(0)
         if id(thing) in seen:
             continue
         seen.add(id(thing))
         if isinstance(thing, wp.array):
             if thing.ptr:
-                spans.append((thing.ptr, thing.ptr + thing.capacity))
+                spans.append((thing.ptr, thing.ptr + thing.capacity, name))
         elif isinstance(thing, dict):
-            waiting.extend(thing.values())
+            waiting += [(f"{name}[{key}]", value) for key, value in thing.items()]
         elif isinstance(thing, (list, tuple)):
-            waiting.extend(thing)
+            waiting += [(f"{name}[{k}]", value) for k, value in enumerate(thing)]
         elif hasattr(thing, "_cls") and hasattr(thing._cls, "vars"):  # an instance of a wp.struct
-            waiting.extend(getattr(thing, name) for name in thing._cls.vars)
+            waiting += [(f"{name}.{own}", getattr(thing, own)) for own in thing._cls.vars]
         elif type(thing).__module__.startswith("warp_eulsph") and hasattr(thing, "__dict__"):
-            waiting.extend(vars(thing).values())
-    total, reached = 0, 0
-    for begin, end in sorted(spans):
-        total += max(0, end - max(begin, reached))
+            waiting += [(f"{name}.{own}", value) for own, value in vars(thing).items()]
+    blocks: list[tuple[list[str], int]] = []
+    reached = 0
+    for begin, end, name in sorted(spans, key=lambda span: (span[0], -span[1])):
+        if begin >= reached:
+            blocks.append(([], 0))
+        names, size = blocks[-1]
+        blocks[-1] = [*names, name], size + max(0, end - max(begin, reached))
         reached = max(reached, end)
-    return total
+    return sorted(blocks, key=lambda block: -block[1])

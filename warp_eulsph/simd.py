@@ -15,9 +15,15 @@ LANES = 4  # of a row
 ALIGNMENT = 64  # bytes, a cache line
 
 
-def packed_rows(space: Space, n: int, vectors: int, device: wp.DeviceLike) -> wp.array:
-    """Zeroed rows of ``vectors`` times four reals for ``n`` particles, (n, 4 · vectors), on a cache line's boundary."""
+def packed_rows(space: Space, n: int, vectors: int, device: wp.DeviceLike, within: wp.array | None = None) -> wp.array:
+    """Rows of ``vectors`` times four reals for ``n`` particles, (n, 4 · vectors), on a cache line's boundary.
+
+    In the memory of the rows ``within`` where they are large enough: for passes that take turns, each of which writes
+    all that it reads. Otherwise in their own, zeroed.
+    """
     size, item = n * vectors * LANES, wp.types.type_size_in_bytes(space.real)
+    if within is not None and within.size >= size > 0:
+        return within.flatten()[:size].reshape((n, vectors * LANES))
     room = wp.zeros(size + ALIGNMENT // item, dtype=space.real, device=device)
     skip = (-(room.ptr or 0) % ALIGNMENT) // item
     return room[skip : skip + size].reshape((n, vectors * LANES))

@@ -211,6 +211,8 @@ class NeighbourLists:
     def release(self) -> None:
         """Free what a search needs besides the lists; the next search allocates it again."""
         self._launch.forget()
+        if self._slices is not None:
+            self._slices.release()
         self.cells = self.grid = self.padded = self.count = None
 
     @property

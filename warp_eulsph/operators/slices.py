@@ -67,6 +67,10 @@ class Slices:
         wp.utils.array_scan(self._width, self._begin, inclusive=False)
         self._launch(_make_lay(), n, [count, self._begin, n, rows.start, rows.stop])
 
+    def release(self) -> None:
+        """Let go of the lengths."""
+        self._launch.forget()
+
 
 def places_taken(count: np.ndarray) -> int:
     """Places that rows of these lengths take in slices, (n,), counted without running over."""

@@ -74,13 +74,18 @@ def _make_forces(space: Space, tilted: bool) -> wp.Kernel:
 
 
 class DualForces(Stabiliser):
-    """M5 at work, sharpened or not (M23); what dissipates and ties there is in the stress already (M9, M16)."""
+    """M5 at work, sharpened or not (M23); what dissipates and ties there is in the stress already (M9, M16).
+
+    ``within``: rows whose memory it may use (``packed_rows``).
+    """
 
     corrects = False
 
-    def __init__(self, space: Space, n: int, sharpener: Sharpener | None, device: wp.DeviceLike):
+    def __init__(
+        self, space: Space, n: int, sharpener: Sharpener | None, device: wp.DeviceLike, within: wp.array | None = None
+    ):
         self.space, self._sharpener, self._launch = space, sharpener, Launcher(device)
-        self._rows = packed_rows(space, n if sharpener is None else 0, space.dim, device)
+        self._rows = packed_rows(space, n if sharpener is None else 0, space.dim, device, within)
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare."""

@@ -101,21 +101,22 @@ class Medium:
         rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
-        self.sharpener: Sharpener | None = None
-        if self.configuration.sharpened:
-            self.sharpener = Sharpener(space, self.configuration, n, device)
-        self.stabiliser: Stabiliser = UpwindForces(space, device)
-        if plain:
-            self.stabiliser = DualForces(space, n, self.sharpener, device)
-        if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
-            _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
-            self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
         self.pairs: PairPotentials | None = None
         if self.policy.fixed and (options.tie is not None or (plain and options.dissipation is not None)):
             upwind = options.dissipation if plain else None
             simd = self.configuration.pairs_by_simd(sensed and plain)
             self.pairs = PairPotentials(options.tie, upwind, simd, space, self.flux, parts.groups, device)
+        within = None if self.pairs is None else self.pairs.rows  # whose sum the others come before or after
+        self.sharpener: Sharpener | None = None
+        if self.configuration.sharpened:
+            self.sharpener = Sharpener(space, self.configuration, n, device, within)
+        self.stabiliser: Stabiliser = UpwindForces(space, device)
+        if plain:
+            self.stabiliser = DualForces(space, n, self.sharpener, device, within)
+        if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
+            _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
+            self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
         breaks = any(part.law.failed is not None for part in self.flux.parts)
@@ -153,8 +154,8 @@ class Medium:
         self.sums = Sums(self.configuration, flux, self.stabiliser.exact(self.grad_v), self.forces, epsilon, d)
 
     def keep_gradients(self, on: bool) -> None:
-        """Whether each step leaves ∇_k v^{n+1} for the next one."""
-        self.steady, self.kept = on, wp.zeros_like(self.grad_v) if on else self.grad_v
+        """Whether each step leaves ∇_k v^{n+1} for the next one, where F^{n+½} was, which is done with by then."""
+        self.steady, self.kept = on, self._own_half.F if on else self.grad_v
 
     @property
     def heats(self) -> bool:

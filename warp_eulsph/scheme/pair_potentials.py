@@ -332,6 +332,9 @@ class PairPotentials:
         simd: whether the pass runs by SIMD kernels, whose M9 knows of no sensor.
         groups: number of each body, equal for those that are bonded: they have the modulus of the softest, so that
             pairs across the joint find the same at both ends.
+
+    Attributes:
+        rows: what the SIMD pass reads of a neighbour; nothing that is needed after it.
     """
 
     def __init__(
@@ -354,7 +357,7 @@ class PairPotentials:
         for M, group in zip(moduli, groups, strict=True):
             softest[group] = min(M, softest.get(group, M))
         self._moduli = wp.array([softest[group] for group in groups], dtype=space.real, device=device)
-        self._rows = packed_rows(space, n if simd else 0, _vectors(space, damped), device)
+        self.rows = packed_rows(space, n if simd else 0, _vectors(space, damped), device)
         self._D = wp.zeros(n if damped and not simd else 0, dtype=space.mat, device=device)
         self._particles = flux.particles
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
@@ -373,10 +376,10 @@ class PairPotentials:
         grad_v, epsilon, forces = sums.grad_v, sums.epsilon, sums.forces
         damped, stressed, dual = self._damped, self._stressed, len(flux.Pi) > 0
         if self._simd:
-            arguments = [reference, flux, state.x, state.F, v, grad_v, self._rows]
+            arguments = [reference, flux, state.x, state.F, v, grad_v, self.rows]
             self._launch(_make_pack(self.space, damped, stressed), len(v), arguments)
             kernel = _make_simd(self.space, damped, stressed, dual, self._yielding)
-            arguments = [reference, near, self._rows, state.F, self._particles, self._moduli, epsilon, flux, forces]
+            arguments = [reference, near, self.rows, state.F, self._particles, self._moduli, epsilon, flux, forces]
             self._launch(kernel, len(v), arguments)
             return
         if damped:

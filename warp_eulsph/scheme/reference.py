@@ -240,6 +240,7 @@ class Configuration:
     def _settle(self) -> None:
         if self.fixed:
             self.lists.release()
+            self._launch.forget()  # what was needed on the way, which would stay with its launches
 
     def _correct(self) -> None:
         n, space = len(self.K), self.space
@@ -297,6 +298,8 @@ class Configuration:
         """
         self.divergence(self.fields.L if unit is None else unit, out)
         self._launch(_make_defect(self.space), len(out), [surface, out])
+        if unit is not None:
+            self._launch.forget()  # the unit stress, which would stay with its launch
 
     def _look_outward(self, nothing: wp.array) -> None:
         """``particles.outward`` from the weights as they are, less ``nothing``."""

@@ -227,14 +227,20 @@ def _make_stress(space: Space, simd: bool) -> wp.Kernel:
 class Sharpener:
     """M23 at work on a reference whose arrangement stays.
 
+    Args:
+        within: rows whose memory it may use (``packed_rows``), which are made anew before they are read again.
+
     Attributes:
         stress_rows: Π̃ in packed rows, after ``stress``; empty without SIMD kernels.
     """
 
-    def __init__(self, space: Space, configuration: Configuration, n: int, device: wp.DeviceLike):
+    def __init__(
+        self, space: Space, configuration: Configuration, n: int, device: wp.DeviceLike, within: wp.array | None = None
+    ):
         self.space, self.configuration, self._launch = space, configuration, Launcher(device)
-        self._rows = packed_rows(space, n, space.dim, device)
-        self.stress_rows = packed_rows(space, n if configuration.simd else 0, space.dim, device)
+        simd = configuration.simd
+        rows = packed_rows(space, 2 * n if simd else n, space.dim, device, within)
+        self._rows, self.stress_rows = rows[:n], rows[n:] if simd else packed_rows(space, 0, space.dim, device)
 
     def gradient(self, f: wp.array, out: wp.array) -> None:
         """``out`` ← ∇̃f of ``f``, both of vec and mat, (n,)."""
@@ -252,6 +258,7 @@ class Sharpener:
         Q = wp.full(n, np.eye(self.space.dim), dtype=self.space.mat, device=self._rows.device)
         Pi = wp.zeros_like(Q)
         self._sharpen(Q, Pi, simd=False)
+        self._launch.forget()  # Q, which would stay with its launches
         return Pi
 
     def _sharpen(self, Q: wp.array, Pi: wp.array, simd: bool) -> None:
