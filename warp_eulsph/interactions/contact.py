@@ -147,7 +147,7 @@ class BoundContact(BoundInteraction):
         flows = np.concatenate([flowing(medium) for medium in world.media])
         solids = [name for name in moving if not flows[self.assembly.bodies[name].start]]
         if solids:
-            _log.info("Contact: %s read their arrangement anew and do not touch themselves; use Convected() there", solids)
+            _log.info("Contact: %s read their arrangement anew and do not touch themselves", solids)
         self._felt[(self._felt == 2) & ~stays] = 0
         if not self._felt.any():
             raise ValueError(
