@@ -38,6 +38,26 @@ def test_surfaces_are_told_from_disorder(dim, n, jitter, options):
     assert found[layers == 0].min() > EXPOSED > found[layers > 0].max()
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_what_flew_off_and_sheets_of_one_layer_are_at_a_surface(dim):
+    """They have next to no e_a: without neighbours, or with as many on both sides. Deep inside a block nothing is."""
+    n = 12
+    x, volume = box((0.0,) * dim, (1.0,) * dim, 1.0 / n)
+    water = es.TaitLiquid(density=1.0, sound_speed=1.0)
+    simulation = es.Simulation(es.Body(x=x, volume=volume, material=water))
+    medium, U = simulation.stepper.medium, simulation.stepper.U
+    moved = U.x.numpy()
+    sheet, lone = moved[:, -1] < 1.0 / n, (moved > 1.0 - 1.0 / n).all(axis=1)
+    deep = (np.abs(moved[:, :-1] - 0.5) < 0.6 / n).all(axis=1) & (np.abs(moved[:, -1] - 7.0 / n) < 1.1 / n)
+    moved[sheet, -1] -= 5.0 / n
+    moved[lone, -1] += 2.5 / n  # the block's edge is within its reach
+    U.x.assign(moved)
+    medium.configuration.refresh(U)
+    medium.stabilise(U)
+    beside = medium.shifter.exposure.beside.numpy()
+    assert deep.any() and beside[sheet | lone].all() and not beside[deep].any()
+
+
 @pytest.mark.parametrize("dim", [1, 2])
 def test_area_vectors_begin_at_free_surfaces_alone(dim):
     """e_a where the support reaches a surface, exactly zero inside a jittered block; they sum to its faces."""

@@ -261,6 +261,8 @@ class BoundContact(BoundInteraction):
 
     def rate(self, world: "World") -> None:
         self._launch.once(make_raise(self.space), 1, [self._frequency, world.clock.fields])
+        for wetting in self._wettings:
+            wetting.rate()
 
     def advance(self, world: "World") -> None:
         for wetting in self._wettings:

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from ..atomics import raise_to
 from ..boundaries import Assembly
 from ..execution import Launcher
-from ..fields import structure
+from ..fields import clock_structure, structure
 from ..operators.neighbours import QUERY_MARGIN
 from ..reduce import Sum
 from ..scheme.reference import LARGEST_GROWTH
@@ -60,7 +61,7 @@ def _pair(weight: Weight, space: Space) -> wp.Function:
 
 @functools.cache
 def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
-    """Kernel: which particles of the liquid have solids in their sums, and L of these: whole across (M28)."""
+    """Kernel: which particles of the liquid have solids in their sums, Σ_b |G_ab|, and L: whole across (M28)."""
     vec, real, dim, vec3, pair = space.vec, space.real, space.dim, _grid_vector(space), _pair(weight, space)
     Reference, reach = structure(space, "Reference"), float(weight.support) * QUERY_MARGIN
     grow = grow_across(space)
@@ -77,13 +78,18 @@ def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
         reference: Reference,
         kappa: wp.array(dtype=real),
         wet: wp.array(dtype=wp.int32),
+        met: wp.array(dtype=real),
     ):
         k = first + wp.tid()
         a = members[k] - offset
         total = vec()
+        size = real(0.0)
         scatter = real(0.0)
         for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
-            total += pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+            G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+            total += G
+            size += wp.length(G)
+        met[k] = size
         wet[k] = int(wp.length_sq(total) > real(0.0))
         if wet[k] == 1:
             n = wp.normalize(total)
@@ -210,6 +216,59 @@ def _make_reaction(weight: Weight, space: Space) -> wp.Kernel:
     return force_on_solid
 
 
+@functools.cache
+def _make_ask(weight: Weight, space: Space) -> wp.Kernel:
+    """Kernel: the largest Σ_a k_a |G_ab| Σ_c |G_ac| / m_b [1/s²] of the solids, k_a = V_a ρ_a c_a² of the liquid (M28).
+
+    It bounds the squares of frequencies at which solids move alone against what the liquid stores.
+    """
+    real, vec3, pair = space.real, _grid_vector(space), _pair(weight, space)
+    Reference, Flux, raise_largest = structure(space, "Reference"), structure(space, "Flux"), raise_to(space.real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def ask(
+        first: int,
+        liquid: wp.uint64,
+        reach: real,
+        at: wp.array(dtype=vec3),
+        V: wp.array(dtype=real),
+        places: wp.array(dtype=wp.int32),
+        own: wp.array(dtype=vec3),
+        members: wp.array(dtype=wp.int32),
+        offset: int,
+        reference: Reference,
+        flux: Flux,
+        kappa: wp.array(dtype=real),
+        met: wp.array(dtype=real),
+        mass: wp.array(dtype=real),
+        largest: wp.array(dtype=real),
+    ):
+        i = first + wp.tid()
+        square = real(0.0)
+        for k in wp.hash_grid_query(liquid, at[i], reach):
+            a = members[k] - offset
+            impedance = flux.impedance[a] * reference.V[a]
+            size = wp.length(pair(own[k], at[i], reference.h[a], kappa[a] * V[i]))
+            square += impedance * impedance / mass[members[k]] * size * met[k]
+        if square > real(0.0):
+            raise_largest(largest, square / mass[places[i]])
+
+    return ask
+
+
+@functools.cache
+def _make_add(space: Space) -> wp.Kernel:
+    """Kernel of one thread: the square of a frequency beside that which was asked for."""
+    real, Clock = space.real, clock_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def add_square(largest: wp.array(dtype=real), clock: Clock):
+        clock.frequency[0] = wp.sqrt(clock.frequency[0] * clock.frequency[0] + largest[0])
+        largest[0] = real(0.0)
+
+    return add_square
+
+
 class WettingOfSolids:
     """The solids in the sums of one liquid (a ``Wall`` of its medium).
 
@@ -231,6 +290,7 @@ class WettingOfSolids:
         self._V = wp.array(V0, dtype=space.real, device=device)
         self._at, self._own = (wp.zeros(k, dtype=_grid_vector(space), device=device) for k in (m, n))
         self._wet = wp.zeros(n, dtype=wp.int32, device=device)
+        self._met, self._largest = (wp.zeros(k, dtype=space.real, device=device) for k in (n, 1))
         sides = [64 if axis < space.dim else 1 for axis in range(3)]
         self._solids, self._liquid = (wp.HashGrid(*sides, device=device, dtype=space.real) for _ in range(2))
         self._reach = float(self._weight.support) * float(medium.particles.h.numpy().max()) * QUERY_MARGIN
@@ -255,7 +315,16 @@ class WettingOfSolids:
         """Where all are in the present reference, which of the liquid is wet, and L of it."""
         self._note()
         reference, kappa = self.medium.configuration.fields, self.medium.stabiliser.kappa
-        arguments = [self._solids.id, self._at, self._V, *self._liquid_members(), reference, kappa, self._wet]
+        arguments = [
+            self._solids.id,
+            self._at,
+            self._V,
+            *self._liquid_members(),
+            reference,
+            kappa,
+            self._wet,
+            self._met,
+        ]
         self._launch(_make_meet(self._weight, self.space), len(self._wet), arguments)
 
     def _liquid_members(self) -> list[Any]:
@@ -272,19 +341,22 @@ class WettingOfSolids:
         arguments = [*self._of(), medium.stabiliser.kappa, self._wet, whole, share, out]
         self._launch(_make_gradient(self._weight, self.space), len(self._wet), arguments)
 
+    def _of_solids(self) -> list[Any]:
+        medium = self.medium
+        found = [self._liquid.id, LARGEST_GROWTH * self._reach, self._at, self._V, self._places]
+        found += [*self._liquid_members(), medium.configuration.fields, medium.flux.fields, medium.stabiliser.kappa]
+        return found
+
     def press(self, out: wp.array) -> None:
         """Add forces [N] on all particles to ``out``, (n,) of vec."""
         self._press_liquid(out)
-        medium = self.medium
-        arguments = [self._liquid.id, LARGEST_GROWTH * self._reach, self._at, self._V, self._places]
-        arguments += [
-            *self._liquid_members(),
-            medium.configuration.fields,
-            medium.flux.fields,
-            medium.stabiliser.kappa,
-            out,
-        ]
-        self._launch(_make_reaction(self._weight, self.space), len(self._places), arguments)
+        self._launch(_make_reaction(self._weight, self.space), len(self._places), [*self._of_solids(), out])
+
+    def rate(self) -> None:
+        """Ask for steps in which solids that are lighter than the liquid are stable."""
+        arguments = [*self._of_solids(), self._met, self.world.particles.mass, self._largest]
+        self._launch(_make_ask(self._weight, self.space), len(self._places), arguments)
+        self._launch.once(_make_add(self.space), 1, [self._largest, self.world.clock.fields])
 
     def _press_liquid(self, out: wp.array) -> None:
         medium, world = self.medium, self.world
@@ -299,8 +371,8 @@ class WettingOfSolids:
         self._launch.once(add_up, 1, [self._step, total])
 
     def evolving(self) -> dict[str, wp.array]:
-        """Where all were in the present reference, and which of the liquid is wet."""
-        return {"at": self._at, "own": self._own, "wet": self._wet}
+        """Where all were in the present reference, which of the liquid is wet, and how much of solids it has met."""
+        return {"at": self._at, "own": self._own, "wet": self._wet, "met": self._met}
 
 
 def find_wettings(world: "World", assembly: Assembly, felt: np.ndarray) -> list[WettingOfSolids]:

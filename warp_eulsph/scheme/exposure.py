@@ -1,18 +1,25 @@
 """Who is at a free surface of an arrangement, and who beside one, by the sums e_a alone."""
 
 import functools
+from typing import TYPE_CHECKING
 
 import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space
-from ..structs import NeighbourRows, ParticleArrays, ReferenceArrays
+from ..structs import NeighbourRows, ParticleArrays
+
+if TYPE_CHECKING:
+    from .reference import Configuration
 
 # A particle is at a free surface where |e_a| exceeds this share of its own face. At flat faces e_a is 1.2 (Wendland C2,
 # dilation 1.8) to 1.4 (cubic spline, 1.3) of it on lattices, at least 0.98 with 20 % jitter; inside it is at most 0.5
 # with 20 % jitter (``tests/test_exposure.py``), and reaches 0.7 in a flow that mixes.
 EXPOSED = 0.8
+# And where M3 sees less than half of the matter around it: what flew off alone, or is a sheet of one layer, has next to
+# no e_a, for it has no neighbours, or as many on both sides.
+SPARSE = 0.5
 
 
 @functools.cache
@@ -33,14 +40,15 @@ def share_of_face(space: Space) -> wp.Function:
 
 @functools.cache
 def _make_expose(space: Space) -> wp.Kernel:
-    """Kernel: which particles are at a free surface, e_a = s_a + d_a; none of those not ``free``."""
-    real, vec, share, least = space.real, space.vec, share_of_face(space), EXPOSED**space.dim
-    Reference = structure(space, "Reference")
+    """Kernel: which particles are at a free surface, e_a = s_a + d_a or few beside; none of those not ``free``."""
+    real, vec, mat, share, least = space.real, space.vec, space.mat, share_of_face(space), EXPOSED**space.dim
+    Reference, few = structure(space, "Reference"), SPARSE * space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
     def expose(
         first: int,
         reference: Reference,
+        K: wp.array(dtype=mat),
         surface: wp.array(dtype=vec),
         defect: wp.array(dtype=vec),
         free: wp.array(dtype=wp.int32),
@@ -48,7 +56,8 @@ def _make_expose(space: Space) -> wp.Kernel:
     ):
         a = first + wp.tid()
         exposed[a] = 0
-        if free[a] != 0 and share(surface[a] + defect[a], reference.V[a]) > real(least):
+        open = share(surface[a] + defect[a], reference.V[a]) > real(least) or wp.trace(K[a]) < real(few)
+        if free[a] != 0 and open:
             exposed[a] = 1
 
     return expose
@@ -110,10 +119,11 @@ class Exposure:
         self.space, self.particles, self.free, self._launch = space, particles, free, Launcher(device)
         self._exposed, self.beside = (wp.zeros(len(free), dtype=wp.int32, device=device) for _ in range(2))
 
-    def find(self, fields: ReferenceArrays, near: NeighbourRows, surface: wp.array, defect: wp.array) -> None:
-        """Look at e_a = s_a + d_a [m^(d−1)], from ``surface`` and ``defect``, (n,) of vec."""
-        n = len(self.free)
-        self._launch(_make_expose(self.space), n, [fields, surface, defect, self.free, self._exposed])
+    def find(self, configuration: "Configuration", surface: wp.array, defect: wp.array) -> None:
+        """Look at e_a = s_a + d_a [m^(d−1)], from ``surface`` and ``defect``, (n,) of vec, and at M3."""
+        n, near = len(self.free), configuration.near
+        arguments = [configuration.fields, configuration.K, surface, defect, self.free, self._exposed]
+        self._launch(_make_expose(self.space), n, arguments)
         self._launch(_make_beside(self.space, self.apart), n, [self.particles, near, self._exposed, self.beside])
 
     def clear(self, near: NeighbourRows, surface: wp.array) -> None:

@@ -199,7 +199,7 @@ class Medium:
         if not self.policy.fixed:
             everyone = wp.full(self.n, 1, dtype=wp.int32, device=self.device)
             exposure = Exposure(self.space, self.particles, everyone, False, self.device)
-            exposure.find(self.configuration.fields, self.configuration.near, surface, nothing_yet)
+            exposure.find(self.configuration, surface, nothing_yet)
             exposure.clear(self.configuration.near, surface)
 
     def look_outward(self, state: StateArrays) -> None:

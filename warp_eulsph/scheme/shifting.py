@@ -197,7 +197,7 @@ class Shifter:
 
     def look(self, configuration: Configuration, defect: wp.array, U: StateArrays) -> None:
         """Who stays until the next refresh, by the ``defect`` e_a − s_a [m^(d−1)] of this one."""
-        self.exposure.find(configuration.fields, configuration.near, U.surface, defect)
+        self.exposure.find(configuration, U.surface, defect)
 
     def apply(
         self,
