@@ -208,21 +208,22 @@ class BoundContact(BoundInteraction):
         """What is outermost now, where the arrangement is read anew or a crack grew, and what is near it."""
         U, clock = world.U, world.clock
         self.skin.tell(self._found.stale)
-        if self.skin.changes and self._found(U, clock.fields):
+        anew = self.skin.changes and self._found(U, clock.fields)
+        if anew:
             self.skin.find()
             self._found.note(U.x)
             self.nearby.forget()
-            self.nearby.look(U, clock.fields)
-            self._give(U)
         self.nearby.look(U, clock.fields, clock.option.growth)
+        if anew and self.nearby.pairs:
+            self._give(U)
 
     def _give(self, U: StateArrays) -> None:
         """What came to the surface presses nothing yet."""
-        if self.nearby.pairs:
-            self.skin.look(U)
-            arguments = [self._arrays, self.nearby.rows, U.x, self.skin.came, self._granted]
-            self._launch(make_give(self.space), len(self._granted), arguments)
-            wp.copy(self._arrays.given, self._granted)
+        self.skin.look(U)
+        wp.copy(self._granted, self._arrays.given)
+        arguments = [self._arrays, self.nearby.rows, U.x, self.skin.came, self._granted]
+        self._launch(make_give(self.space), len(self._granted), arguments)
+        wp.copy(self._arrays.given, self._granted)
 
     def check(self, world: "World", running: wp.array) -> None:
         if self.skin.changes:
