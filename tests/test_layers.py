@@ -44,7 +44,8 @@ FRONT_ENDS = {"cli.py"} | {
     )
 }
 FRONT_ENDS |= {
-    f"validation/{name}.py" for name in ("command", "punch_elements", "step_cost", "balance_sweeps", "coarse", "rods")
+    f"validation/{name}.py"
+    for name in ("command", "punch_elements", "step_cost", "balance_sweeps", "coarse", "rods", "rod_elements")
 }
 FRONT_ENDS |= {f"commands/{path.name}" for path in (PACKAGE / "commands").glob("*.py")}
 

@@ -1,4 +1,4 @@
-"""The benchmark cases: a jittered block of rubber, spinning and waving, in every mode, dimension and precision."""
+"""The benchmark cases: a jittered block, spinning and waving, of rubber in every mode and of water, by its defaults."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from ..geometry import box
-from ..materials import J2, LinearHardening, Material, NeoHookean
+from ..materials import J2, LinearHardening, Material, NeoHookean, TaitLiquid
 from ..scheme.arrangement import Current
 from ..scheme.policy import Always, Every, Never, ReferencePolicy
 from ..simulation import Body, Simulation
@@ -16,6 +16,8 @@ STEPS_PER_REFRESH = 10  # of the mode every_k
 MODES: dict[str, ReferencePolicy] = {"total": Never(), "every_k": Every(STEPS_PER_REFRESH), "eulerian": Always()}
 #: Of the stiffness of the rubber, yielding all over once it moves: what plasticity costs.
 METAL = J2(density=1100.0, young=17e6, poisson=0.45, hardening=LinearHardening(yield_stress=1e4, modulus=1e5))
+#: With free surfaces, by the defaults of liquids.
+WATER = TaitLiquid(density=1000.0, sound_speed=100.0)
 DTYPES = {"float32": wp.float32, "float64": wp.float64}
 
 
@@ -70,6 +72,9 @@ def _all() -> Iterator[BenchCase]:
         for dtype in DTYPES:
             for dim, side in ((1, 20_000), (2, 224), (3, 37)):
                 yield BenchCase(f"{mode}-{dim}d-{dtype}", dim, dtype, mode, side)
+    for dtype in DTYPES:
+        for dim, side in ((2, 150), (3, 30)):
+            yield BenchCase(f"liquid-{dim}d-{dtype}", dim, dtype, "eulerian", side, material=WATER)
     for mode in ("total", "eulerian"):
         for dtype in DTYPES:
             yield BenchCase(f"{mode}-3d-{dtype}-2-threads", 3, dtype, mode, 37, threads=2)

@@ -24,20 +24,25 @@ LEAST = 1.0
 
 @contextmanager
 def timed_kernels() -> Iterator[defaultdict[wp.Kernel, float]]:
-    """Processor seconds of each kernel that is launched over particles within the context."""
+    """Processor seconds of each kernel that is launched within the context."""
     seconds: defaultdict[wp.Kernel, float] = defaultdict(float)
-    launch = execution.Launcher.__call__
+    kept = {name: getattr(execution.Launcher, name) for name in ("__call__", "once")}
 
-    def timed(self: execution.Launcher, kernel: wp.Kernel, *arguments: Any, **named: Any) -> None:
-        start = time.process_time()
-        launch(self, kernel, *arguments, **named)
-        seconds[kernel] += time.process_time() - start
+    def timed(launch: Any) -> Any:
+        def launch_timed(self: execution.Launcher, kernel: wp.Kernel, *arguments: Any, **named: Any) -> None:
+            start = time.process_time()
+            launch(self, kernel, *arguments, **named)
+            seconds[kernel] += time.process_time() - start
 
-    execution.Launcher.__call__ = timed  # type: ignore[method-assign]
+        return launch_timed
+
+    for name, launch in kept.items():
+        setattr(execution.Launcher, name, timed(launch))
     try:
         yield seconds
     finally:
-        execution.Launcher.__call__ = launch  # type: ignore[method-assign]
+        for name, launch in kept.items():
+            setattr(execution.Launcher, name, launch)
 
 
 def kernel_times(simulation: Simulation, rounds: int = ROUNDS) -> dict[wp.Kernel, float]:

@@ -16,6 +16,8 @@ PHASES = {
     "stress (M1)": ["_stress"],
     "forces (M5, M9)": ["_sum_forces"],
     "updates (M14)": ["_drift", "_kick", "_start_mean", "_finish_mean"],
+    "shifting (M15)": ["_shift"],
+    "histories and volumes (M24)": ["_update"],
     "conditions": ["_impose"],
     "ledger": ["ledger.record"],
 }

@@ -147,7 +147,6 @@ def _make_gradient(space: Space) -> wp.Kernel:
         offset: int,
         v: wp.array(dtype=vec),
         pose: Pose,
-        share: real,
         out: wp.array(dtype=mat),
     ):
         i = first + wp.tid()
@@ -161,7 +160,7 @@ def _make_gradient(space: Space) -> wp.Kernel:
             for j in range(wp.static(dim)):
                 jump[j] = jump[j] + real(spatial[j])
             n = wp.normalize(G)
-            out[a] = out[a] + wp.outer(n * (wp.dot(n, jump) * share), G)
+            out[a] = out[a] + wp.outer(n * wp.dot(n, jump), G)
 
     return add_gradient
 
@@ -277,9 +276,9 @@ class Wetting:
         arguments += [self._kappa, self.met]
         self._launch(_make_meet(self.space, body.option.shape.distance), len(self._wet), arguments)
 
-    def add_gradient(self, v: wp.array, share: float, out: wp.array) -> None:
-        """Add a share of what the wall's matter adds to ∇_k v (M28)."""
-        arguments = [*self._of(), self.medium.span.start, v, self._moves, share, out]
+    def add_gradient(self, v: wp.array, out: wp.array) -> None:
+        """Add what the wall's matter adds to ∇_k v (M28)."""
+        arguments = [*self._of(), self.medium.span.start, v, self._moves, out]
         self._launch(_make_gradient(self.space), len(self._wet), arguments)
 
     def look_ahead(self, wrench: wp.array) -> None:

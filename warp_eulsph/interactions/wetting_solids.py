@@ -46,15 +46,19 @@ def _make_note(space: Space) -> wp.Kernel:
 
 @functools.cache
 def _pair(weight: Weight, space: Space) -> wp.Function:
-    """``wp.func`` (x_a, x_b, h_a, κ V_b) -> 2 κ V_b g_ab ξ [1/m], G of one particle of a solid."""
+    """``wp.func`` (x_a, x_b, h_a, κ V_b) -> 2 κ V_b g_ab ξ [1/m], G of one particle of a solid, mostly zero."""
     vec, real, dim, vec3, g_of = space.vec, space.real, space.dim, _grid_vector(space), pair_weight(weight, space)
+    reach = float(weight.support) * QUERY_MARGIN
 
     @wp.func
     def pair(x_a: vec3, x_b: vec3, h: real, kappa_V: real) -> vec:
         xi = vec()
         for j in range(wp.static(dim)):
             xi[j] = x_b[j] - x_a[j]
-        return xi * (real(2.0) * kappa_V * g_of(wp.length(xi), h))
+        G = vec()
+        if wp.length_sq(xi) < real(reach) * real(reach) * h * h:  # grids ask whole cells
+            G = xi * (real(2.0) * kappa_V * g_of(wp.length(xi), h))
+        return G
 
     return pair
 
@@ -128,7 +132,6 @@ def _make_gradient(weight: Weight, space: Space) -> wp.Kernel:
         kappa: wp.array(dtype=real),
         wet: wp.array(dtype=wp.int32),
         v: wp.array(dtype=vec),
-        share: real,
         out: wp.array(dtype=mat),
     ):
         k = first + wp.tid()
@@ -137,8 +140,9 @@ def _make_gradient(weight: Weight, space: Space) -> wp.Kernel:
             total = mat()
             for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
                 G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
-                total += wp.outer(v[places[i]] - v[members[k]], G)
-            out[a] = out[a] + total * share
+                if wp.length_sq(G) > real(0.0):
+                    total += wp.outer(v[places[i]] - v[members[k]], G)
+            out[a] = out[a] + total
 
     return add_gradient
 
@@ -175,9 +179,11 @@ def _make_force(weight: Weight, space: Space) -> wp.Kernel:
             force = vec()
             rate = real(0.0)
             for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
-                f = (flux.Q[a] @ pair(own[k], at[i], reference.h[a], kappa[a] * V[i])) * reference.V[a]
-                force += f
-                rate += wp.dot(f, v[places[i]] - v[members[k]])
+                G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+                if wp.length_sq(G) > real(0.0):
+                    f = (flux.Q[a] @ G) * reference.V[a]
+                    force += f
+                    rate += wp.dot(f, v[places[i]] - v[members[k]])
             out[members[k]] = out[members[k]] + force
             power[k] = dt[0] * wp.float64(rate)
 
@@ -210,7 +216,9 @@ def _make_reaction(weight: Weight, space: Space) -> wp.Kernel:
         force = vec()
         for k in wp.hash_grid_query(liquid, at[i], reach):
             a = members[k] - offset
-            force -= (flux.Q[a] @ pair(own[k], at[i], reference.h[a], kappa[a] * V[i])) * reference.V[a]
+            G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+            if wp.length_sq(G) > real(0.0):
+                force -= (flux.Q[a] @ G) * reference.V[a]
         out[places[i]] = out[places[i]] + force
 
     return force_on_solid
@@ -247,9 +255,10 @@ def _make_ask(weight: Weight, space: Space) -> wp.Kernel:
         square = real(0.0)
         for k in wp.hash_grid_query(liquid, at[i], reach):
             a = members[k] - offset
-            impedance = flux.impedance[a] * reference.V[a]
             size = wp.length(pair(own[k], at[i], reference.h[a], kappa[a] * V[i]))
-            square += impedance * impedance / mass[members[k]] * size * met[k]
+            if size > real(0.0):
+                impedance = flux.impedance[a] * reference.V[a]
+                square += impedance * impedance / mass[members[k]] * size * met[k]
         if square > real(0.0):
             raise_largest(largest, square / mass[places[i]])
 
@@ -315,16 +324,8 @@ class WettingOfSolids:
         """Where all are in the present reference, which of the liquid is wet, and L of it."""
         self._note()
         reference, kappa = self.medium.configuration.fields, self.medium.stabiliser.kappa
-        arguments = [
-            self._solids.id,
-            self._at,
-            self._V,
-            *self._liquid_members(),
-            reference,
-            kappa,
-            self._wet,
-            self._met,
-        ]
+        arguments = [self._solids.id, self._at, self._V, *self._liquid_members()]
+        arguments += [reference, kappa, self._wet, self._met]
         self._launch(_make_meet(self._weight, self.space), len(self._wet), arguments)
 
     def _liquid_members(self) -> list[Any]:
@@ -334,11 +335,11 @@ class WettingOfSolids:
         liquid, reference = self._liquid_members(), self.medium.configuration.fields
         return [self._solids.id, self._at, self._V, self._places, *liquid, reference]
 
-    def add_gradient(self, v: wp.array, share: float, out: wp.array) -> None:
-        """Add a share of what solids add to ∇_k v (M28)."""
+    def add_gradient(self, v: wp.array, out: wp.array) -> None:
+        """Add what solids add to ∇_k v (M28)."""
         world, medium = self.world, self.medium
         whole = world.half.v if v.ptr == medium.of(world.half).v.ptr else world.U.v
-        arguments = [*self._of(), medium.stabiliser.kappa, self._wet, whole, share, out]
+        arguments = [*self._of(), medium.stabiliser.kappa, self._wet, whole, out]
         self._launch(_make_gradient(self._weight, self.space), len(self._wet), arguments)
 
     def _of_solids(self) -> list[Any]:

@@ -145,13 +145,14 @@ def make_pair_sums_simd(weight: Weight, space: Space) -> wp.Kernel:
 
 @functools.cache
 def corrected_inverse(space: Space) -> wp.Function:
-    """``wp.func`` K⁻¹, the pseudo-inverse where an eigenvalue of K is below ``CUTOFF``."""
+    """``wp.func`` (K) -> (K⁻¹, 0); where eigenvalues of K are below ``CUTOFF`` the pseudo-inverse, and how many are."""
     real, mat, dim = space.real, space.mat, space.dim
     invert, bounds, eigen = inverse(space), symmetric_bounds(space), symmetric_eigen(space)
 
     @wp.func
-    def corrected_inverse(K: mat) -> mat:
+    def corrected_inverse(K: mat):
         L = mat()
+        lacking = int(0)
         if bounds(K)[0] >= real(CUTOFF):
             L = invert(K)
         else:
@@ -160,7 +161,9 @@ def corrected_inverse(space: Space) -> wp.Function:
                 if values[i] >= real(CUTOFF):
                     axis = wp.transpose(R)[i]
                     L += wp.outer(axis, axis) / values[i]
-        return L
+                else:
+                    lacking += 1
+        return L, lacking
 
     return corrected_inverse
 
@@ -168,21 +171,13 @@ def corrected_inverse(space: Space) -> wp.Function:
 @functools.cache
 def make_correct(space: Space) -> wp.Kernel:
     """Kernel: L_a from K_a (M3), which may be the same array; ``poor``: directions in which a particle fell back."""
-    real, mat, dim = space.real, space.mat, space.dim
-    Reference = structure(space, "Reference")
-    invert, bounds, eigen = corrected_inverse(space), symmetric_bounds(space), symmetric_eigen(space)
+    mat, Reference, invert = space.mat, structure(space, "Reference"), corrected_inverse(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def correct(first: int, K: wp.array(dtype=mat), reference: Reference, poor: wp.array(dtype=wp.int32)):
         a = first + wp.tid()
-        K_a = mat(K[a])
-        reference.L[a] = invert(K_a)
-        lacking = int(0)
-        if bounds(K_a)[0] < real(CUTOFF):
-            _, values = eigen(K_a)
-            for i in range(wp.static(dim)):
-                if values[i] < real(CUTOFF):
-                    lacking += 1
+        L, lacking = invert(mat(K[a]))
+        reference.L[a] = L
         poor[a] = lacking
 
     return correct

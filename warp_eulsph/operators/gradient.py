@@ -6,7 +6,7 @@ import warp as wp
 
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
-from .row_sums import outer_sum
+from .row_sums import outer_sum, slope_sum
 
 
 @functools.cache
@@ -14,7 +14,7 @@ def make_gradient(space: Space, components: int, simd: bool = False) -> wp.Kerne
     """Kernel: ∇f_a = Σ_b V_b g_ab (f_b − f_a) ⊗ ξ L_a, for rows f of ``components`` reals (M4).
 
     ξ joins the balanced positions of the particles (M13), their positions where nothing is balanced. ``simd`` has a
-    meaning for rows of ``dim`` reals only.
+    meaning for rows of one real or ``dim`` reals only.
     """
     row, row_gradient = space.row(components), space.row_gradient(components)
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -34,6 +34,26 @@ def make_gradient(space: Space, components: int, simd: bool = False) -> wp.Kerne
             out[a] = sum_of(a, near, f, reference.balanced) @ reference.L[a]
 
         return vector_gradient
+
+    if components == 1:
+        slope_of = slope_sum(space, simd)
+
+        @wp.kernel(module="unique", enable_backward=False)
+        def scalar_gradient(
+            first: int,
+            reference: Reference,
+            near: Neighbours,
+            f: wp.array(dtype=row),
+            out: wp.array(dtype=row_gradient),
+        ):
+            a = first + wp.tid()
+            slope = slope_of(a, near, f, reference.balanced)
+            sums = row_gradient()
+            for i in range(wp.static(space.dim)):
+                sums[0, i] = slope[i]
+            out[a] = sums @ reference.L[a]
+
+        return scalar_gradient
 
     @wp.kernel(module="unique", enable_backward=False)
     def gradient(

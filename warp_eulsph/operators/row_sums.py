@@ -120,6 +120,57 @@ def outer_sum(space: Space, simd: bool, of_positions: bool) -> wp.Function:
 
 
 @functools.cache
+def slope_sum(space: Space, simd: bool) -> wp.Function:
+    """``wp.func`` (a, near, f, x) -> Σ_b w_ab (f_b − f_a)(x_b − x_a) of a field of one real, x positions, own w."""
+    real, vec, row = space.real, space.vec, space.row(1)
+    Neighbours = neighbour_structure(space)
+    separation = difference(space)
+    if not simd:
+
+        @wp.func
+        def slope_sum(a: int, near: Neighbours, f: wp.array(dtype=row), x: wp.array(dtype=vec)):
+            f_a, x_a = f[a], x[a]
+            total = vec()
+            for k in range(near.start[a], near.stop[a], near.stride):
+                b = near.index[k]
+                total += separation(x[b], x_a, near.box) * near.own[k] * (f[b][0] - f_a[0])
+            return total
+
+        return slope_sum
+
+    snippet = f"""
+    {prelude(space)}
+    const Q x_one = load(x.data[a].c);
+    const V x_a = both(x_one, x_one), f_a = (V)f.data[a].c[0];
+    V sums[4] = {{0, 0, 0, 0}};
+    auto two = [&](int b, int c, V w, int part) __attribute__((always_inline)) {{
+        const V df = both((Q)f.data[b].c[0], (Q)f.data[c].c[0]) - f_a;
+        sums[part] += nearest(both(load(x.data[b].c), load(x.data[c].c)) - x_a) * (df * w);
+    }};
+    {BY_TWO}
+    return store(fold((sums[0] + sums[1]) + (sums[2] + sums[3])));
+    """
+
+    @wp.func_native(snippet)
+    def slope_row(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        box: vec,
+        f: wp.array(dtype=row),
+        x: wp.array(dtype=vec),
+    ) -> vec: ...
+
+    @wp.func
+    def slope_sum_simd(a: int, near: Neighbours, f: wp.array(dtype=row), x: wp.array(dtype=vec)):
+        return slope_row(a, near.start[a], near.start[a + 1], near.index, near.own, near.box, f, x)
+
+    return slope_sum_simd
+
+
+@functools.cache
 def flux_sum(space: Space, simd: bool) -> wp.Function:
     """``wp.func`` (a, near, Q, x) -> Σ_b w_ab (Q_a + Q_b)(x_b − x_a) for a field of ``mat``."""
     real, vec, mat = space.real, space.vec, space.mat

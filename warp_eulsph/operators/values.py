@@ -70,7 +70,8 @@ def make_value_correction(weight: Weight, space: Space, linear: bool) -> wp.Kern
             M_2 += wp.outer(offset, offset) * VW
         slope = vec()
         if wp.static(linear):
-            slope = -(invert(M_2 / M_0) @ (M_1 / M_0))
+            L, _ = invert(M_2 / M_0)
+            slope = -(L @ (M_1 / M_0))
         alpha[a] = real(1.0) / (M_0 + wp.dot(slope, M_1))
         beta[a] = slope / h_a
 

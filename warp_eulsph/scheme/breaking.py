@@ -85,7 +85,8 @@ def _make_cut(space: Space, tilted: bool) -> wp.Kernel:
             K += wp.outer(xi, xi) * near.own[k]
         if lost > 0:
             frayed[a] = 1
-            reference.L[a] = invert(K)
+            L, _ = invert(K)
+            reference.L[a] = L
             reference.diagonal[a] = diagonal
             if wp.static(tilted):
                 reference.moment[a] = moment

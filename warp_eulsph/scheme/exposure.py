@@ -67,6 +67,27 @@ def _make_expose(space: Space) -> wp.Kernel:
 def _make_beside(space: Space, apart: bool) -> wp.Kernel:
     """Kernel: which particles are exposed or have neighbours that are, or, with ``apart``, ones of another body."""
     Particles, Neighbours = structure(space, "Particles"), neighbour_structure(space)
+    other = "found |= body.data[b] != body.data[a];" if apart else ""
+
+    # C++, for loops of Warp look at one neighbour after another
+    @wp.func_native(f"""
+    int found = exposed.data[a];
+    for (int k = begin; k < end; k += stride) {{
+        const int b = index.data[k];
+        found |= exposed.data[b];
+        {other}
+    }}
+    return found;
+    """)
+    def any_beside(
+        a: int,
+        begin: int,
+        end: int,
+        stride: int,
+        index: wp.array(dtype=int),
+        exposed: wp.array(dtype=int),
+        body: wp.array(dtype=int),
+    ) -> int: ...
 
     @wp.kernel(module="unique", enable_backward=False)
     def find_beside(
@@ -77,14 +98,7 @@ def _make_beside(space: Space, apart: bool) -> wp.Kernel:
         beside: wp.array(dtype=wp.int32),
     ):
         a = first + wp.tid()
-        found = exposed[a]
-        for k in range(near.start[a], near.stop[a], near.stride):
-            b = near.index[k]
-            if exposed[b] != 0:
-                found = 1
-            if wp.static(apart) and particles.body[b] != particles.body[a]:
-                found = 1
-        beside[a] = found
+        beside[a] = any_beside(a, near.start[a], near.stop[a], near.stride, near.index, exposed, particles.body)
 
     return find_beside
 

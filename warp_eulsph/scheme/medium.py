@@ -98,7 +98,7 @@ class Medium:
             held = _held(conditions, self.span)
             self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
-        rows = n if self.shifter or (smoothing is not None and smoothing.needs_gradient) else 0
+        rows = n if smoothing is not None and smoothing.needs_gradient else 0
         self.grad_F = wp.zeros(rows, dtype=space.row_gradient(space.dim**2), device=device)
         plain = self.configuration.plain
         sensed = options.dissipation is not None and options.dissipation.sensor is not None
@@ -127,7 +127,7 @@ class Medium:
         users = [option for option in (options.dissipation, options.limiter) if option is not None]
         sensors = {option.sensor for option in users if option.sensor is not None}
         self.sensors = {sensor: SensorField(sensor, space, self.particles, device) for sensor in sensors}
-        self.walls = Walls()
+        self.walls = Walls(space.mat, n, device)
         self.heating: Heating | None = None
         self.volumes: VolumeFlux | None = None
         self.smoothed_F_k = self.configuration.fields.F
@@ -246,9 +246,11 @@ class Medium:
         """Shift the particles (M15), where the options say so."""
         if self.shifter is not None:
             U, psi = self.of(state), self.stabiliser.potentials.psi
-            self.velocity_gradient(state)
-            self.configuration.gradient(self._rows(U.F), self.grad_F)
-            self.shifter.apply(self.configuration, psi, U, self.grad_v, self.grad_F, self.clock)
+            grad_v = self.kept  # of this v; walls have moved since
+            if not self.steady or self.walls:
+                grad_v = self.grad_v
+                self.velocity_gradient(state)
+            self.shifter.apply(self.configuration, psi, U, grad_v, self.clock)
 
     # the lines of a step
 
@@ -304,13 +306,13 @@ class Medium:
     def stress(self, state: StateArrays, fraction: float) -> None:
         """Q of F (M1), which is ``fraction`` · Δt ahead of the histories."""
         self.flux.compute(self.of(state).F, self.grad_v, self.configuration, self.clock, fraction)
-        self.stabiliser.exact(self.walls.without(self.of(state).v, self.grad_v, self.sums.grad_v))
+        self.stabiliser.exact(self.walls.without(self.grad_v))
         self.stabiliser.turn(self.sums, self.clock, fraction)
 
     def sum_forces(self, state: StateArrays, rates: StateArrays) -> None:
         """Internal forces at x and F of ``state`` (M5, M16), dissipation at v of ``rates`` (M9)."""
         at, v = self.of(state), self.of(rates).v
-        grad_v = self.stabiliser.exact(self.walls.without(v, self.grad_v, self.sums.grad_v))
+        grad_v = self.stabiliser.exact(self.walls.without(self.grad_v))
         if self.heating is not None:
             self.heating.note(at.x, v, grad_v)
         if self.pairs is not None:

@@ -57,13 +57,27 @@ class Shifting:
 
 
 @functools.cache
-def _make_shift(space: Space) -> wp.Kernel:
+def _make_stretch(space: Space) -> wp.Kernel:
+    """Kernel: s of F = s I."""
+    mat, row = space.mat, space.row(1)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def stretch(first: int, F: wp.array(dtype=mat), out: wp.array(dtype=row)):
+        a = first + wp.tid()
+        out[a] = row(F[a][0, 0])
+
+    return stretch
+
+
+@functools.cache
+def _make_shift(space: Space, even: bool) -> wp.Kernel:
     """Kernel: x += G δ, F += ∇_k F · δ, impulse m ∇_k v · δ and its couple, δ = ½ rate ψ in the reference (M15), kept.
 
-    Nothing moves once the target time is reached or the run has failed.
+    With ``even`` F is s I, and the gradient given is that of s. Nothing moves once the target time is reached or the
+    run has failed.
     """
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
-    rows, invert, padded = space.row_gradient(dim**2), inverse(space), pad(space)
+    rows, invert, padded = space.row_gradient(1 if even else dim**2), inverse(space), pad(space)
     Particles, Reference, State = (
         structure(space, "Particles"),
         structure(space, "Reference"),
@@ -105,7 +119,10 @@ def _make_shift(space: Space) -> wp.Kernel:
         F = state.F[a]
         for i in range(wp.static(dim)):
             for j in range(wp.static(dim)):
-                F[i, j] = F[i, j] + change[i * wp.static(dim) + j]
+                if wp.static(not even):
+                    F[i, j] = F[i, j] + change[i * wp.static(dim) + j]
+                elif i == j:
+                    F[i, j] = F[i, j] + change[0]
         impulse[a] = (grad_v[a] @ delta) * mass
         couple[a] = wp.cross(padded(moved), padded(state.v[a])) * wp.float64(mass)
         state.F[a] = F
@@ -183,11 +200,15 @@ class Shifter:
         self.option, self.space, self.particles, self.device = option, space, particles, device
         n, self._launch = len(particles.mass), Launcher(device)
         self._moved = wp.zeros(n, dtype=space.vec, device=device)
+        self._even = flux.forgets
+        self._stretch = wp.zeros(n if self._even else 0, dtype=space.row(1), device=device)
+        gradient = space.row_gradient(1 if self._even else space.dim**2)
+        self._grad_F = wp.zeros(n, dtype=gradient, device=device)
         self._remaps = [Remap(space, part, n, device) for part in flux.parts if part.law.history]
         free = np.ones(n, dtype=np.int32)
         free[held] = 0
         self.free = wp.array(free, dtype=wp.int32, device=device)
-        self.exposure = Exposure(space, particles, self.free, True, device)
+        self.exposure = Exposure(space, particles, self.free, len(flux.bodies) > 1, device)
         self.impulse = wp.zeros(n, dtype=space.vec, device=device)
         self.projection = Projection(space, particles, flux.bodies, device)
 
@@ -205,11 +226,16 @@ class Shifter:
         psi: wp.array,
         U: StateArrays,
         grad_v: wp.array,
-        grad_F: wp.array,
         clock: ClockArrays,
     ) -> None:
-        """Shift the particles of ``U``, whose gradients in the reference are given; ψ [m] are its potentials (M13)."""
+        """Shift the particles of ``U``, whose ∇_k v is given; ψ [m] are the potentials of its reference (M13)."""
         option, n, reference = self.option, len(psi), configuration.fields
+        rows = self._stretch
+        if self._even:
+            self._launch(_make_stretch(self.space), n, [U.F, rows])
+        else:
+            rows = U.F.view(self.space.row(self.space.dim**2))
+        configuration.gradient(rows, self._grad_F)
         arguments = [
             self.particles,
             reference,
@@ -218,13 +244,13 @@ class Shifter:
             self.free,
             self.exposure.beside,
             grad_v,
-            grad_F,
+            self._grad_F,
             option.rate,
             option.bound,
             U,
         ]
         arguments += [self._moved, self.impulse, self.projection.couples]
-        self._launch(_make_shift(self.space), n, arguments)
+        self._launch(_make_shift(self.space, self._even), n, arguments)
         for remap in self._remaps:
             remap(configuration, self._moved)
         self.projection(U.x, self.impulse)

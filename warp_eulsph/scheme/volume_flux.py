@@ -5,14 +5,18 @@ from collections.abc import Callable
 
 import warp as wp
 
-from ..execution import Launcher
+from ..execution import Launcher, simd
 from ..fields import clock_structure, neighbour_structure, structure
 from ..materials import Law
 from ..materials.base import history_row, long_form
+from ..simd import BY_EIGHT, OWN_ROW, packed_rows, prelude
 from ..space import Space, difference
 from ..structs import ClockArrays, ParticleArrays
 from .flux import Flux
 from .stabiliser import Sums
+
+# Rows of four that the SIMD pass reads of a neighbour.
+VECTORS = 2
 
 
 @functools.cache
@@ -66,6 +70,96 @@ def _make_exchange(space: Space) -> wp.Kernel:
 
 
 @functools.cache
+def _make_pack(space: Space) -> wp.Kernel:
+    """Kernel: what the SIMD pass reads of a neighbour: x_k with the impedance, ½∇p with p."""
+    real, row, gradient, dim = space.real, space.row(1), space.row_gradient(1), space.dim
+    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pack(
+        first: int,
+        reference: Reference,
+        flux: Flux,
+        p: wp.array(dtype=row),
+        grad_p: wp.array(dtype=gradient),
+        rows: wp.array2d(dtype=real),
+    ):
+        a = first + wp.tid()
+        x_a, grad_a = reference.x[a], grad_p[a]
+        for i in range(wp.static(dim)):
+            rows[a, i] = x_a[i]
+            rows[a, 4 + i] = grad_a[0, i] * real(0.5)
+        rows[a, 3] = flux.impedance[a]
+        rows[a, 7] = p[a][0]
+
+    return pack
+
+
+@functools.cache
+def _make_exchange_simd(space: Space) -> wp.Kernel:
+    """SIMD kernel of ``_make_exchange``, from packed rows."""
+    real, vec = space.real, space.vec
+    Clock, Neighbours = clock_structure(space), neighbour_structure(space)
+    snippet = f"""
+    {prelude(space)}
+    constexpr int vectors = {VECTORS};
+    const Q* const all = (const Q*)rows.data;
+    {OWN_ROW}
+    // impedances and gradients are added where the rest is subtracted
+    const V x_a = mine(0, -1), p_a = mine(1, -1);
+    V flow = 0;
+    auto eight = [&](const int* b, V w) __attribute__((always_inline)) {{
+        V xi[4], p[4], X[4], P[4];
+        #pragma unroll
+        for (int i = 0; i < 4; ++i) {{
+            const Q* const B = all + (size_t)b[i] * vectors;
+            const Q* const C = all + (size_t)b[i + 4] * vectors;
+            xi[i] = nearest(both(B[0], C[0]) - x_a);
+            p[i] = both(B[1], C[1]) + p_a;
+        }}
+        turn(xi, X);
+        turn(p, P);
+        V rr = X[0] * X[0], jump = P[3] - P[0] * X[0];
+        #pragma unroll
+        for (int j = 1; j < dim; ++j) {{
+            rr += X[j] * X[j];
+            jump -= P[j] * X[j];
+        }}
+        const V Z = X[3];
+        flow -= Z > 0 ? w * __builtin_elementwise_sqrt(rr) * jump / Z : (V)0;
+    }};
+    {BY_EIGHT}
+    return total(flow);
+    """
+
+    @wp.func_native(snippet)
+    def sum_flow(
+        a: int,
+        begin: int,
+        end: int,
+        index: wp.array(dtype=int),
+        w: wp.array(dtype=real),
+        box: vec,
+        rows: wp.array2d(dtype=real),
+    ) -> real: ...
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def exchange_simd(
+        first: int,
+        near: Neighbours,
+        rows: wp.array2d(dtype=real),
+        epsilon: real,
+        clock: Clock,
+        out: wp.array(dtype=real),
+    ):
+        a = first + wp.tid()
+        flow = sum_flow(a, near.start[a], near.start[a + 1], near.index, near.w, near.box, rows)
+        out[a] = flow * epsilon * real(clock.dt[0])
+
+    return exchange_simd
+
+
+@functools.cache
 def _make_take(space: Space, law: Law) -> wp.Kernel:
     """Kernel: J ← (1 + ΔV/V) J; what that took of the energy is dissipated, or heat where the law takes it."""
     real, mat, row, root = space.real, space.mat, history_row(space, law), 1.0 / space.dim
@@ -114,6 +208,7 @@ class VolumeFlux:
         self._launch, n = Launcher(device), len(change)
         self._p = wp.zeros(n, dtype=space.row(1), device=device)
         self._grad_p = wp.zeros(n, dtype=space.row_gradient(1), device=device)
+        self._rows = packed_rows(space, n if simd(device) else 0, VECTORS, device)
 
     def find(self, sums: Sums, exact: Callable[[wp.array], wp.array], clock: ClockArrays) -> None:
         """ΔV/V of the step, by the pressures that it was made with."""
@@ -121,8 +216,14 @@ class VolumeFlux:
         self._launch(_make_pressure(self.space), n, [sums.flux, self._p])
         configuration.gradient(self._p, self._grad_p)
         gradient = exact(self._grad_p)
-        arguments = [configuration.fields, configuration.near, sums.flux, self._p, gradient, sums.epsilon]
-        self._launch(_make_exchange(self.space), n, [*arguments, clock, self.change])
+        fields, near = configuration.fields, configuration.near
+        if configuration.simd:
+            self._launch(_make_pack(self.space), n, [fields, sums.flux, self._p, gradient, self._rows])
+            arguments = [near, self._rows, sums.epsilon, clock, self.change]
+            self._launch(_make_exchange_simd(self.space), n, arguments)
+            return
+        arguments = [fields, near, sums.flux, self._p, gradient, sums.epsilon, clock, self.change]
+        self._launch(_make_exchange(self.space), n, arguments)
 
     def take(self, F: wp.array) -> None:
         """Into J."""
