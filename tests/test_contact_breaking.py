@@ -93,3 +93,30 @@ def test_a_container_bursts_with_closed_books(speed):
     # Planes through particles that came apart made it 0.3 to 1200 times the energy, from nothing
     assert -0.06 < found["account"] < 0.005
     assert 0.8 < found["momentum"] < 1.1 and found["failed"] > 0.05
+
+
+def test_halves_of_a_cracked_bar_touch_what_a_crack_let_go():
+    """Four columns of one bar are let go; its halves, which feel nobody across, fly at these and bounce off."""
+    h, speed = 0.1, 1.0
+    x = rectangle(20, 4, h, (-1.0, 0.0))
+    v = np.stack([-speed * np.sign(x[:, 0]), np.zeros(len(x))], axis=1)
+    loose = abs(x[:, 0]) < 2.1 * h
+    v[loose] = 0.0
+    tough = Failing(material=SOFT, failure=PrincipalStrain(energy=1e9, strain=1.0))
+    simulation = es.Simulation(
+        es.Body(x=x, volume=h * h, material=tough, velocity=v, name="bar"), interactions=[es.Contact()]
+    )
+    breaking = simulation.stepper.media[0].breaking
+    breaking.cut.assign(loose.astype(np.int32))
+    breaking._fresh.zero_()
+    breaking._cut()
+    start, held, gaps = simulation.energy()["total"], 0.0, []
+    left, right = x[:, 0] < -2.1 * h, x[:, 0] > 2.1 * h
+    for _ in simulation.frames(np.linspace(0.005, 0.1, 20)):
+        held = max(held, simulation.energy()["held"])
+        gaps.append((simulation.x[right, 0].min() - simulation.x[left, 0].max()) / h)
+    energy = simulation.energy()
+    assert held > 0.01 * start and min(gaps) > 1.0
+    assert simulation.v[left, 0].mean() < -0.2 * speed and simulation.v[right, 0].mean() > 0.2 * speed
+    assert abs(energy["interaction"]) < 0.01 * start and abs(energy["residual"]) < 1e-12 * start
+    assert np.abs(simulation.momentum()).max() < 1e-11 * simulation.particles.mass.numpy().sum() * speed

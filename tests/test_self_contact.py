@@ -179,8 +179,9 @@ def test_a_notch_that_closes():
     assert force["closed"] > 2.0 * force["open"]
 
 
-def test_what_touches_itself():
-    """By default all whose arrangement stays; by name; what is read anew does not, and says so if it was named."""
+def test_what_touches_itself(caplog):
+    """By default all whose arrangement stays; by name; what is read anew does not: logged, and refused by name."""
+    caplog.set_level("INFO", logger="warp_eulsph")
     body = fork(2)
     other = es.Body(x=rectangle(4, 4, 0.1, (3.0, 0.0)), volume=0.01, material=SOFT, name="other")
 
@@ -191,6 +192,8 @@ def test_what_touches_itself():
     assert felt(es.Contact()) == [[2, 1], [1, 2]]
     assert felt(es.Contact(between=[("fork", "other")])) == [[0, 1], [1, 0]]
     assert felt(es.Contact(between=[("fork", "fork")])) == [[2, 0], [0, 0]]
+    assert "do not touch themselves" not in caplog.text
     assert felt(es.Contact(), arrangement=es.Current()) == [[0, 1], [1, 0]]
+    assert "['fork', 'other'] read their arrangement anew and do not touch themselves" in caplog.text
     with pytest.raises(ValueError, match=r"must keep their arrangement, \['fork'\] read it anew"):
         es.Simulation([body, other], interactions=[es.Contact(between=[("fork", "fork")])], arrangement=es.Current())

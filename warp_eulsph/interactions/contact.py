@@ -1,5 +1,6 @@
 """Contact of bodies, and of a body with itself: they push where they touch, and do not pass through."""
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,14 +16,16 @@ from ..execution import Launcher
 from ..structs import StateArrays
 from .base import BoundInteraction, Interaction
 from .friction import make_slip
-from .law import make_push, make_raise, make_rate, skin_structure
+from .law import make_give, make_push, make_raise, make_rate, skin_structure
 from .moved import Moved
 from .nearby import Nearby, matter_structure
-from .skin import Skin
+from .skin import Skin, flowing
 from .wetting_solids import find_wettings
 
 if TYPE_CHECKING:
     from ..scheme.world import World
+
+_log = logging.getLogger(__name__)
 
 # Least distance of particles of two bodies at the start, in spacings: faces that touch have 1, or more.
 APART = 0.9
@@ -44,8 +47,7 @@ class Contact(Interaction):
 
     A body whose arrangement stays that of the start touches itself, too, where it folds, is crushed, or a notch closes:
     matter that neither feels each other by weights nor would by this law at the start. Where the arrangement is read
-    anew what meets becomes neighbours. Bodies that may break (``Failing``) do not touch themselves, nor do those that
-    are one medium with them.
+    anew what meets becomes neighbours. Where it breaks (``Failing``), what lost its pairs touches what it lost.
 
     Args:
         between: pairs of names of bodies that touch each other, ("ring", "ring") for one that touches itself; all with
@@ -120,6 +122,7 @@ class BoundContact(BoundInteraction):
         for name in ("places", "there", "area", "half", "modulus", "shear_modulus", "normal", "bend"):
             setattr(self._arrays, name, getattr(self.skin, name))
         k, n, device = len(self.skin.indices), world.n, world.device
+        self._arrays.given, self._granted = (wp.zeros(k, dtype=self.space.real, device=device) for _ in range(2))
         self._energy = wp.zeros(k, dtype=wp.float64, device=device)
         self._frequency = wp.zeros(1, dtype=self.space.real, device=device)
         self._nothing = wp.zeros(n, dtype=self.space.vec, device=device)
@@ -131,18 +134,20 @@ class BoundContact(BoundInteraction):
             self._measure(world, world.U)
 
     def _leave_out_moving(self, world: "World") -> None:
-        """Bodies whose arrangement is read anew, or that may break, do not touch themselves."""
+        """Bodies whose arrangement is read anew do not touch themselves."""
         names = list(self.assembly.bodies)
         fixed = np.concatenate([np.full(medium.n, medium.configuration.fixed) for medium in world.media])
-        fixed &= np.concatenate([np.full(medium.n, medium.breaking is None) for medium in world.media])
         stays = fixed[[own.start for own in self.assembly.bodies.values()]]
         moving = [names[k] for k in np.flatnonzero((np.diag(self._felt) == 2) & ~stays)]
         if moving and self.option.between is not None:
             raise ValueError(
-                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew, or "
-                "may break; what meets there becomes neighbours. Leave them out of between, or build with "
-                "arrangement=Convected() and matter that does not break"
+                f"Contact: bodies that touch themselves must keep their arrangement, {moving} read it anew; "
+                "what meets there becomes neighbours. Leave them out of between, or build with arrangement=Convected()"
             )
+        flows = np.concatenate([flowing(medium) for medium in world.media])
+        solids = [name for name in moving if not flows[self.assembly.bodies[name].start]]
+        if solids:
+            _log.info("Contact: %s read their arrangement anew and do not touch themselves", solids)
         self._felt[(self._felt == 2) & ~stays] = 0
         if not self._felt.any():
             raise ValueError(
@@ -154,6 +159,7 @@ class BoundContact(BoundInteraction):
         order, indices, device = self.assembly.order, self.skin.indices, world.device
         support = np.concatenate([np.full(medium.n, medium.configuration.lists.support) for medium in world.media])
         matter = matter_structure(self.space)()
+        matter.torn = self.skin.torn
         for name, values in {
             "X": self.assembly.X,
             "outward": order.by_number(world.particles.outward.numpy()),
@@ -202,11 +208,22 @@ class BoundContact(BoundInteraction):
         """What is outermost now, where the arrangement is read anew or a crack grew, and what is near it."""
         U, clock = world.U, world.clock
         self.skin.tell(self._found.stale)
-        if self.skin.changes and self._found(U, clock.fields):
+        anew = self.skin.changes and self._found(U, clock.fields)
+        if anew:
             self.skin.find()
             self._found.note(U.x)
             self.nearby.forget()
         self.nearby.look(U, clock.fields, clock.option.growth)
+        if anew and self.nearby.pairs:
+            self._give(U)
+
+    def _give(self, U: StateArrays) -> None:
+        """What came to the surface presses nothing yet."""
+        self.skin.look(U)
+        wp.copy(self._granted, self._arrays.given)
+        arguments = [self._arrays, self.nearby.rows, U.x, self.skin.came, self._granted]
+        self._launch(make_give(self.space), len(self._granted), arguments)
+        wp.copy(self._arrays.given, self._granted)
 
     def check(self, world: "World", running: wp.array) -> None:
         if self.skin.changes:
@@ -272,6 +289,8 @@ class BoundContact(BoundInteraction):
                 "there": self.skin.there,
                 "area": self.skin.area,
                 "bend": self.skin.bend,
+                "torn": self.skin.torn,
+                "given": self._arrays.given,
             }
         for k, wetting in enumerate(self._wettings):
             held |= {"passed": self._passed} | {f"{name}.{k}": array for name, array in wetting.evolving().items()}

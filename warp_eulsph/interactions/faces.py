@@ -227,6 +227,7 @@ def make_area(space: Space) -> wp.Kernel:
     """Kernel: the face of each outermost particle, 1/Σ_b φ_ab over those of its face, and how far these are from flat.
 
     What was outermost before keeps both: energies that depend on them must not jump. Those ``alone`` are outermost too.
+    ``came`` says what was not, or has lost pairs since: ``torn`` is 2 where all are ``cut``, 1 where some are.
     """
     vec, real, dim, weight_of = space.vec, space.real, space.dim, surface_weight(space)[0]
     moments_of, eigen, order_of = plane_moments(space), symmetric_eigen(space), least_two(space)
@@ -247,7 +248,10 @@ def make_area(space: Space) -> wp.Kernel:
         outward: wp.array(dtype=vec),
         outermost: wp.array(dtype=wp.int32),
         alone: wp.array(dtype=wp.int32),
+        cut: wp.array(dtype=wp.int32),
         there: wp.array(dtype=wp.int32),
+        torn: wp.array(dtype=wp.int32),
+        came: wp.array(dtype=wp.int32),
         area: wp.array(dtype=real),
         bend: wp.array(dtype=real),
     ):
@@ -255,6 +259,9 @@ def make_area(space: Space) -> wp.Kernel:
         a = members[k] - offset
         now = wp.max(outermost[a], alone[a])
         known = there[k] == 1 and now == 1
+        apart = alone[a] + cut[a]
+        came[k] = int(now == 1 and (not known or apart > torn[k]))
+        torn[k] = apart
         there[k] = now
         if known:
             return

@@ -29,7 +29,7 @@ TOUCH = float(np.hypot(2.0 * REACH, 1.0))
 def matter_structure(space: Space) -> Any:
     """``wp.struct`` of what is known of a skin's particles in the reference.
 
-    Place [m], way out, spacing [m] and radius of the support of weights [m].
+    Place [m], way out, spacing [m], radius of the support of weights [m], and how far it is torn off (``Skin.torn``).
     """
 
     @wp.struct
@@ -38,6 +38,7 @@ def matter_structure(space: Space) -> Any:
         outward: wp.array(dtype=space.vec)
         spacing: wp.array(dtype=space.real)
         support: wp.array(dtype=space.real)
+        torn: wp.array(dtype=wp.int32)
 
     return Matter
 
@@ -65,7 +66,8 @@ def _strangers(space: Space) -> wp.Function:
 
     Of other bodies all may, felt = 1. Of one (felt = 2) those that do not feel each other by weights, nor would by the
     law in the reference, and of those so near that rows would hold them there the ones across a gap, which lie before
-    each other and do not look the same way.
+    each other and do not look the same way. What a crack let go feels nobody by weights, and who lies beside one looks
+    all ways.
     """
     real, Matter, alike = space.real, matter_structure(space), alike_vectors(space)
 
@@ -73,13 +75,16 @@ def _strangers(space: Space) -> wp.Function:
     def strangers(matter: Matter, k: int, m: int, felt: int) -> bool:
         if felt < 2:
             return felt == 1
+        torn = wp.max(matter.torn[k], matter.torn[m])
+        if torn == 2:
+            return True
         d = matter.X[m] - matter.X[k]
         apart = wp.length(d)
         spacing = wp.max(matter.spacing[k], matter.spacing[m])
         known = wp.max(real(0.5) * (matter.support[k] + matter.support[m]), real(TOUCH) * spacing)
         if apart < known:
             return False
-        if apart < real(wp.static(RANGE + MARGIN)) * spacing:
+        if torn == 0 and apart < real(wp.static(RANGE + MARGIN)) * spacing:
             before = wp.dot(d, matter.outward[k]) > real(0.0) and wp.dot(d, matter.outward[m]) < real(0.0)
             return before and not alike(matter.outward[k], matter.outward[m])
         return True

@@ -12,11 +12,20 @@ from ..execution import Launcher, launch
 from ..space import Space
 from ..structs import StateArrays
 from .faces import make_area, make_find, make_outward
-from .normals import make_beside, make_lever, make_normals, make_turn, make_want
+from .normals import make_beside, make_lever, make_normals, make_planes, make_turn, make_want
 
 if TYPE_CHECKING:
     from ..scheme.medium import Medium
     from ..scheme.world import World
+
+
+def flowing(medium: "Medium") -> np.ndarray:
+    """Which particles of a medium flow, (n,) int32: they change places all the time."""
+    flows = np.zeros(medium.n, dtype=np.int32)
+    for part in medium.flux.parts:
+        moves = not medium.configuration.fixed and part.law.update is not None and part.law.rebase is None
+        flows[part.first : part.first + part.size] = moves
+    return flows
 
 
 class _Layer:
@@ -33,20 +42,18 @@ class _Layer:
         n = medium.n
         self.outermost = wp.zeros(n, dtype=wp.int32, device=device)
         fixed, exact = medium.configuration.fixed, medium.surface_given
-        flowing = np.zeros(n, dtype=np.int32)
-        for part in medium.flux.parts:
-            flows = not fixed and part.law.update is not None and part.law.rebase is None
-            flowing[part.first : part.first + part.size] = flows
-        self._flowing = wp.array(flowing, dtype=wp.int32, device=device)
+        flows = flowing(medium)
+        self._flowing = wp.array(flows, dtype=wp.int32, device=device)
         self.outward = medium.particles.outward
-        if not fixed and (flowing.any() or not exact):
+        if not fixed and (flows.any() or not exact):
             self.outward = wp.zeros(n, dtype=space.vec, device=device)
         self.breaking = medium.breaking if fixed else None
         self.alone = self._flowing if self.breaking is None else self.breaking.frayed
         self.changes = self.breaking is not None
-        self.changes |= self.outward is not medium.particles.outward and not flowing.all()
+        self.changes |= self.outward is not medium.particles.outward and not flows.all()
         self.least = 0.0 if exact else LARGE
-        self._normals, self._centres, self._levers = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(3))
+        self._normals, self._centres = (wp.zeros(n, dtype=space.vec, device=device) for _ in range(2))
+        self._levers = wp.zeros(n, dtype=space.mat, device=device)
         self._masses = wp.zeros(n, dtype=space.real, device=device)
         self.wanted = wp.zeros(n, dtype=wp.int32, device=device)
 
@@ -59,10 +66,14 @@ class _Layer:
         arguments = [self.medium.particles, configuration.fields, configuration.near, configuration.poor]
         arguments += [self._flowing, self.outward]
         self._launch(make_find(self.space), n, [*arguments, self.least, self.outermost])
+        if configuration.fixed and self.space.dim > 1:
+            arguments = [self.medium.particles, configuration.fields, configuration.near, self.outward, self.outermost]
+            self._launch(make_planes(self.space), n, [*arguments, self._normals, self._centres, self._masses])
 
-    def areas(self, places: wp.array, there: wp.array, area: wp.array, bend: wp.array) -> None:
-        """The face of each of its particles at ``places``, whether it is outermost, and how flat it lies."""
-        arguments = [*self._of(places), self.outward, self.outermost, self.alone, there, area, bend]
+    def areas(self, places: wp.array, *found: wp.array) -> None:
+        """What the skin has of its particles at ``places``: ``there``, ``torn``, ``came``, ``area`` and ``bend``."""
+        cut = self._flowing if self.breaking is None else self.breaking.cut
+        arguments = [*self._of(places), self.outward, self.outermost, self.alone, cut, *found]
         self._launch(make_area(self.space), len(places), arguments)
 
     def normals(self, places: wp.array, state: StateArrays, normal: wp.array, answer: wp.array) -> None:
@@ -84,11 +95,12 @@ class _Layer:
         self, places: wp.array, answer: wp.array, beside: wp.array, state: StateArrays, slope: wp.array, out: wp.array
     ) -> None:
         """Add the forces on particles by which normals answer the slopes ∂E/∂n of an energy."""
-        arguments = [places, self.medium.span.start, self.wanted, answer, slope, self._levers]
-        self._launch(make_lever(self.space), len(places), arguments)
+        fixed = self.medium.configuration.fixed
+        arguments = [places, self.medium.span.start, self.medium.particles, self.wanted, self._normals, self._masses]
+        self._launch(make_lever(self.space, fixed), len(places), [*arguments, answer, slope, self._levers])
         arguments = [*self._of(places), self.medium.of(state), self.outward, self.wanted, beside]
-        arguments += [self._normals, self._centres, self._masses, self._levers, out]
-        self._launch(make_turn(self.space), len(places), arguments)
+        arguments += [self._centres, self._masses, self._levers, out]
+        self._launch(make_turn(self.space, fixed), len(places), arguments)
 
     def _of(self, places: wp.array) -> list[Any]:
         configuration = self.medium.configuration
@@ -114,6 +126,8 @@ class Skin:
         places: where they lie, (k,) int32 on the device, kept right.
         bodies: number of the body of each, (k,) int32, on the device.
         there: whether it is outermost, (k,) int32.
+        torn: 1 where it lost pairs to a crack, 2 where it lost all, (k,) int32.
+        came: whether it is outermost, or more torn, since the last ``find``, (k,) int32.
         area: face of each in the reference [m^(d−1)], (k,).
         half: distance from the particle to the surface, half a spacing [m], (k,).
         modulus, shear_modulus: ρ c² of pressure and of shear waves at F = I [Pa], (k,).
@@ -158,7 +172,7 @@ class Skin:
         self.bodies = wp.array(body, dtype=wp.int32, device=device)
         self.half = wp.array(0.5 * spacing, dtype=world.space.real, device=device)
         self.modulus, self.shear_modulus = (wp.array(M, dtype=world.space.real, device=device) for M in moduli.T)
-        self.there = wp.zeros(k, dtype=wp.int32, device=device)
+        self.there, self.torn, self.came = (wp.zeros(k, dtype=wp.int32, device=device) for _ in range(3))
         self.area, self.bend = (wp.zeros(k, dtype=world.space.real, device=device) for _ in range(2))
         self.normal, self.slope = (wp.zeros(k, dtype=world.space.vec, device=device) for _ in range(2))
         self._beside = wp.full(k, 1, dtype=wp.int32, device=device)
@@ -169,7 +183,8 @@ class Skin:
         self.want(self._all)  # until somebody knows better
 
     def _arrays(self) -> list[wp.array]:
-        return [self.places, self.there, self.area, self.bend, self.normal, self.slope, self._answer, self._beside]
+        of_find = [self.places, self.there, self.torn, self.came, self.area, self.bend]
+        return [*of_find, self.normal, self.slope, self._answer, self._beside]
 
     @property
     def changes(self) -> bool:
@@ -190,8 +205,8 @@ class Skin:
     def find(self) -> None:
         """Which particles are outermost in the present references, and the face of each; launches only."""
         self.find_layers()
-        for layer, (places, there, area, bend, *_) in zip(self._layers, self._parts, strict=True):
-            layer.areas(places, there, area, bend)
+        for layer, parts in zip(self._layers, self._parts, strict=True):
+            layer.areas(*parts[:6])
 
     def rebuild(self) -> None:
         """Derive what goes by place, after particles changed places; all normals are asked for."""
@@ -211,7 +226,7 @@ class Skin:
 
     def look(self, state: StateArrays) -> None:
         """Normals of the skin where the particles are in ``state`` (struct ``State``); launches only."""
-        for layer, (places, _, _, _, normal, _, answer, _) in zip(self._layers, self._parts, strict=True):
+        for layer, (places, *_, normal, _, answer, _) in zip(self._layers, self._parts, strict=True):
             layer.normals(places, state, normal, answer)
 
     def turn(self, state: StateArrays, out: wp.array) -> None:
@@ -226,5 +241,5 @@ class Skin:
         """
         if self.space.dim > 1:
             for layer, parts in zip(self._layers, self._parts, strict=True):
-                places, _, _, _, _, slope, answer, beside = parts
+                places, *_, slope, answer, beside = parts
                 layer.turn(places, answer, beside, state, slope, out)
