@@ -4,7 +4,9 @@ No GPU: Warp's ahead-of-time compiler needs no driver. ``-s`` prints the registe
 """
 
 import dataclasses
+import itertools
 
+import numpy as np
 import pytest
 import warp as wp
 from bodies import block
@@ -12,8 +14,17 @@ from cubin import usage
 
 import warp_eulsph as es
 from warp_eulsph import execution
-from warp_eulsph.interactions import Free, Sphere
-from warp_eulsph.materials import J2, DruckerPrager, IdealGas, JohnsonCook, MieGruneisen, Newtonian
+from warp_eulsph.interactions import Free, Plane, Sphere
+from warp_eulsph.materials import (
+    J2,
+    DruckerPrager,
+    Failing,
+    IdealGas,
+    JohnsonCook,
+    MieGruneisen,
+    Newtonian,
+    PrincipalStrain,
+)
 
 CASES = [
     pytest.param(3, wp.float32, 90),
@@ -51,6 +62,32 @@ def problems(dim, dtype):
         yield es.Simulation(flowing, boundaries=[fixed], scheme=es.Verlet(dissipation=upwind), dtype=dtype)
 
 
+def options(dim, dtype):
+    """What the scheme can be told to do besides."""
+    body, sensor = block(dim, 5), es.DimensionlessSensor()
+    for scheme, arrangement in (
+        (es.Verlet(es.Upwind(sensor=sensor), correction=es.PairAreas()), es.Current()),
+        (es.Verlet(es.Upwind(sensor=sensor)), None),
+        (es.Verlet(es.Upwind(stress=True)), None),
+        (es.LaxWendroff(limiter=es.FluxCorrectedTransport()), es.Current()),
+    ):
+        yield es.Simulation(body, scheme=scheme, dtype=dtype, **({"arrangement": arrangement} if arrangement else {}))
+
+
+def touching(dim, dtype):
+    """Water by default on a floor, between two blocks that touch, rub and may break."""
+    steel = es.NeoHookean(density=7800.0, young=2e9, poisson=0.3)
+    brittle = Failing(material=steel, failure=PrincipalStrain(energy=1e3, strain=0.01))
+    solid, up = block(dim, 5), np.eye(dim)[-1]
+    lower = dataclasses.replace(solid, material=steel, name="lower")
+    upper = dataclasses.replace(solid, x=solid.x + up, material=brittle, name="upper")
+    water = es.TaitLiquid(density=1e3, sound_speed=30.0)
+    liquid = dataclasses.replace(solid, x=solid.x + 2.0 * up, material=water, name="water")
+    yield es.Simulation([lower, upper, liquid], interactions=[es.Contact(friction=0.3)], dtype=dtype)
+    floor = es.RigidBody(Plane(normal=up), centre=2.0 * up)
+    yield es.Simulation(liquid, interactions=[floor], dtype=dtype)
+
+
 @pytest.mark.parametrize(("dim", "dtype", "arch"), CASES)
 def test_kernels_of_a_step_compile_and_do_not_spill(dim, dtype, arch, monkeypatch, tmp_path):
     launched = {}
@@ -62,7 +99,7 @@ def test_kernels_of_a_step_compile_and_do_not_spill(dim, dtype, arch, monkeypatc
 
     monkeypatch.setattr(wp, "launch", recording_launch)
     monkeypatch.setattr(execution, "_simd", False)  # the portable kernels, which GPUs run
-    for simulation in problems(dim, dtype):
+    for simulation in itertools.chain(problems(dim, dtype), touching(dim, dtype), options(dim, dtype)):
         simulation.step(2)
         simulation.energy()
         simulation.momentum()

@@ -122,6 +122,15 @@ class TestFile:
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "once":
                 assert ast.unparse(node.args[1]) == "1", f"line {node.lineno}: a kernel of several threads in one piece"
 
+    def test_kernels_are_made_where_messages_about_them_are_summed_up(self, path):
+        """In functions ``make_…``: by these names ``notices`` knows the package's kernels."""
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        makers = [node for node in tree.body if isinstance(node, ast.FunctionDef) and "make_" in node.name]
+        made = {id(node) for maker in makers for node in ast.walk(maker)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef) and "wp.kernel" in decorators(node):
+                assert id(node) in made, node.name
+
     def test_kernels_can_be_split(self, path):
         """A kernel of several threads begins at ``first`` and sums nothing into what another thread writes to."""
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

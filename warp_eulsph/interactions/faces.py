@@ -77,22 +77,27 @@ def alike_vectors(space: Space) -> wp.Function:
 
 @functools.cache
 def least_two(space: Space) -> wp.Function:
-    """``wp.func`` which eigenvalues are the least and the next to it."""
+    """``wp.func`` the place of the least eigenvalue, it, and the next to it.
+
+    No entry is taken by a number found at run time, which on GPUs would need memory instead of registers.
+    """
     vec, dim = space.vec, space.dim
 
     @wp.func
     def find_two(values: vec):
-        least = int(0)
+        place = int(0)
+        least = values[0]
         for i in range(1, wp.static(dim)):
-            if values[i] < values[least]:
-                least = i
-        next = int(0)
-        if least == 0:
-            next = wp.static(min(1, dim - 1))
+            if values[i] < least:
+                place = i
+                least = values[i]
+        next = values[0]
+        if place == 0:
+            next = values[wp.static(min(1, dim - 1))]
         for i in range(wp.static(dim)):
-            if i != least and values[i] < values[next]:
-                next = i
-        return least, next
+            if i != place and values[i] < next:
+                next = values[i]
+        return place, least, next
 
     return find_two
 
@@ -270,10 +275,10 @@ def make_area(space: Space) -> wp.Kernel:
         if wp.static(dim > 1):
             total, _mean, square = moments_of(a, particles, reference, near, reference.x, outward, outermost)
             _, spread = eigen(square)
-            least, next = order_of(spread)
+            _place, least, next = order_of(spread)
             uneven = real(1.0)
-            if spread[next] > real(SPREAD):
-                uneven = wp.clamp(spread[least] / spread[next], real(0.0), real(1.0))
+            if next > real(SPREAD):
+                uneven = wp.clamp(least / next, real(0.0), real(1.0))
         area[k] = real(1.0) / total
         if alone[a] == 1 or wp.length_sq(outward[a]) == real(0.0):  # nobody knows beside whom
             area[k] = wp.pow(particles.V0[a], real(wp.static(1.0 - 1.0 / dim)))

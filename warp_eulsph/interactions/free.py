@@ -1,5 +1,6 @@
 """A rigid body that moves freely: drift, kick, drift, with turns about the principal axes one after the other."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -46,54 +47,71 @@ def spin_of(R: wp.mat33d, L: wp.vec3d, inverse: wp.vec3d) -> wp.vec3d:
     return R @ wp.cw_mul(inverse, wp.transpose(R) @ L)
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def _drift(pose: Pose, inverse: wp.vec3d, dt: wp.array(dtype=wp.float64), fraction: wp.float64, out: Pose):
-    tau = fraction * dt[0]
-    out.x[0] = pose.x[0] + tau * pose.v[0]
-    out.R[0] = drifted(pose.R[0], pose.L[0], inverse, tau)
-    out.v[0] = pose.v[0]
-    out.L[0] = pose.L[0]
-    out.spin[0] = spin_of(out.R[0], pose.L[0], inverse)
+@functools.cache
+def _make_drift() -> wp.Kernel:
+    """Kernel: the pose after a share of a step without forces."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def drift(pose: Pose, inverse: wp.vec3d, dt: wp.array(dtype=wp.float64), fraction: wp.float64, out: Pose):
+        tau = fraction * dt[0]
+        out.x[0] = pose.x[0] + tau * pose.v[0]
+        out.R[0] = drifted(pose.R[0], pose.L[0], inverse, tau)
+        out.v[0] = pose.v[0]
+        out.L[0] = pose.L[0]
+        out.spin[0] = spin_of(out.R[0], pose.L[0], inverse)
+
+    return drift
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def _kick(
-    wrench: wp.array(dtype=Wrench),
-    own: Wrench,
-    inverse_mass: wp.float64,
-    inverse: wp.vec3d,
-    dt: wp.array(dtype=wp.float64),
-    pose: Pose,
-    work: wp.array(dtype=wp.float64),
-):
-    """v and L by the forces of bodies and its own, whose work is exact by the mean velocities."""
-    w = wrench[0] + own
-    v, L, R = pose.v[0], pose.L[0], pose.R[0]
-    v_new = v + dt[0] * inverse_mass * wp.vec3d(w[0], w[1], w[2])
-    L_new = L + dt[0] * wp.vec3d(w[3], w[4], w[5])
-    spin = spin_of(R, L + L_new, inverse)
-    force, moment = wp.vec3d(own[0], own[1], own[2]), wp.vec3d(own[3], own[4], own[5])
-    work[0] = work[0] + wp.float64(0.5) * dt[0] * (wp.dot(force, v + v_new) + wp.dot(moment, spin))
-    pose.v[0] = v_new
-    pose.L[0] = L_new
+@functools.cache
+def _make_kick() -> wp.Kernel:
+    """Kernel: v and L by the forces of bodies and its own, whose work is exact by the mean velocities."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def kick(
+        wrench: wp.array(dtype=Wrench),
+        own: Wrench,
+        inverse_mass: wp.float64,
+        inverse: wp.vec3d,
+        dt: wp.array(dtype=wp.float64),
+        pose: Pose,
+        work: wp.array(dtype=wp.float64),
+    ):
+        w = wrench[0] + own
+        v, L, R = pose.v[0], pose.L[0], pose.R[0]
+        v_new = v + dt[0] * inverse_mass * wp.vec3d(w[0], w[1], w[2])
+        L_new = L + dt[0] * wp.vec3d(w[3], w[4], w[5])
+        spin = spin_of(R, L + L_new, inverse)
+        force, moment = wp.vec3d(own[0], own[1], own[2]), wp.vec3d(own[3], own[4], own[5])
+        work[0] = work[0] + wp.float64(0.5) * dt[0] * (wp.dot(force, v + v_new) + wp.dot(moment, spin))
+        pose.v[0] = v_new
+        pose.L[0] = L_new
+
+    return kick
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def _foresee(
-    wrench: wp.array(dtype=Wrench),
-    own: Wrench,
-    inverse_mass: wp.float64,
-    inverse: wp.vec3d,
-    dt: wp.array(dtype=wp.float64),
-    fraction: wp.float64,
-    pose: Pose,
-    out: Pose,
-):
-    w, tau = wrench[0] + own, fraction * dt[0]
-    out.x[0] = pose.x[0]
-    out.R[0] = pose.R[0]
-    out.v[0] = pose.v[0] + tau * inverse_mass * wp.vec3d(w[0], w[1], w[2])
-    out.spin[0] = spin_of(pose.R[0], pose.L[0] + tau * wp.vec3d(w[3], w[4], w[5]), inverse)
+@functools.cache
+def _make_foresee() -> wp.Kernel:
+    """Kernel: the pose to come, by forces as they are."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def foresee(
+        wrench: wp.array(dtype=Wrench),
+        own: Wrench,
+        inverse_mass: wp.float64,
+        inverse: wp.vec3d,
+        dt: wp.array(dtype=wp.float64),
+        fraction: wp.float64,
+        pose: Pose,
+        out: Pose,
+    ):
+        w, tau = wrench[0] + own, fraction * dt[0]
+        out.x[0] = pose.x[0]
+        out.R[0] = pose.R[0]
+        out.v[0] = pose.v[0] + tau * inverse_mass * wp.vec3d(w[0], w[1], w[2])
+        out.spin[0] = spin_of(pose.R[0], pose.L[0] + tau * wp.vec3d(w[3], w[4], w[5]), inverse)
+
+    return foresee
 
 
 class BoundFree(BoundRigidMotion):
@@ -112,17 +130,17 @@ class BoundFree(BoundRigidMotion):
 
     def ahead(self, clock: ClockArrays, fraction: float, wrench: wp.array) -> Pose:
         numbers = [self._own, self.inverse_mass, self.inverse_inertia, clock.dt, fraction]
-        self._launch.once(_foresee, 1, [wrench, *numbers, self.pose, self._foreseen])
+        self._launch.once(_make_foresee(), 1, [wrench, *numbers, self.pose, self._foreseen])
         return self._foreseen
 
     def advance(self, clock: ClockArrays, wrench: wp.array) -> None:
         self._drift(clock, 0.5, self.pose)
         arguments = [wrench, self._own, self.inverse_mass, self.inverse_inertia, clock.dt, self.pose, self.work]
-        self._launch.once(_kick, 1, arguments)
+        self._launch.once(_make_kick(), 1, arguments)
         self._drift(clock, 0.5, self.pose)
 
     def _drift(self, clock: ClockArrays, fraction: float, out: Pose) -> None:
-        self._launch.once(_drift, 1, [self.pose, self.inverse_inertia, clock.dt, fraction, out])
+        self._launch.once(_make_drift(), 1, [self.pose, self.inverse_inertia, clock.dt, fraction, out])
 
     def kinetic(self) -> float:
         v, L, R = (getattr(self.pose, name).numpy()[0] for name in ("v", "L", "R"))

@@ -63,7 +63,7 @@ def plane_normal(space: Space) -> wp.Function:
     S n = λ n of least λ, S = ⟨ξ'⊗ξ'⟩ − ⟨ξ⟩⊗⟨ξ⟩, ξ' from their mean ⟨ξ⟩, of the outermost particles around at ``x``.
     Around a corner the mean lies within: without its square moments about it are much alike, and n would swing by a
     right angle where they cross. On flat faces it lies across n and changes nothing. Returns n to the side of ``out``,
-    zero where there is no plane; eigenvectors and eigenvalues, the place of λ, Σ w, and 2⟨ξ⟩.
+    zero where there is no plane; eigenvectors and eigenvalues, λ, Σ w, and 2⟨ξ⟩.
     """
     vec, real, dim = space.vec, space.real, space.dim
     moments_of, eigen, order_of = plane_moments(space), symmetric_eigen(space, SWEEPS[dim]), least_two(space)
@@ -86,11 +86,13 @@ def plane_normal(space: Space) -> wp.Function:
     ):
         mass, mean, square = moments_of(a, particles, reference, near, x, outward, outermost)
         axes, spread = eigen(square - wp.outer(mean, mean))
-        least, next = order_of(spread)
+        place, least, next = order_of(spread)
         n = vec()
-        if spread[next] > real(SPREAD) and wp.length(out) > real(0.0):
+        if next > real(SPREAD) and wp.length(out) > real(0.0):
             for i in range(wp.static(dim)):
-                n[i] = axes[i, least]
+                for j in range(wp.static(dim)):
+                    if j == place:
+                        n[i] = axes[i, j]
             if wp.dot(n, out) < real(0.0):
                 n = -n
         return n, axes, spread, least, mass, real(2.0) * mean
@@ -234,11 +236,11 @@ def make_normals(space: Space, fixed: bool) -> wp.Kernel:
                 if wp.length_sq(found) > real(0.0):
                     n = found
                     for i in range(wp.static(dim)):
-                        if spread[i] > spread[least]:
+                        if spread[i] > least:
                             e = vec()
                             for j in range(wp.static(dim)):
                                 e[j] = axes[j, i]
-                            turns += wp.outer(e, e) / ((spread[i] - spread[least]) * mass * particles.spacing[a])
+                            turns += wp.outer(e, e) / ((spread[i] - least) * mass * particles.spacing[a])
                 centres[a] = centre
                 masses[a] = mass
         if wp.static(not fixed):

@@ -176,22 +176,27 @@ def _make_carry(space: Space, along: bool) -> wp.Kernel:
     return carry
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def _settle(
-    wrench: wp.array(dtype=Wrench),
-    there: Pose,
-    dt: wp.array(dtype=wp.float64),
-    pose: Pose,
-    work: wp.array(dtype=wp.float64),
-):
-    """The prescribed pose becomes that of the body; its drive did what bodies took from it."""
-    w, moved = wrench[0], there.x[0] - pose.x[0]
-    force, moment = wp.vec3d(w[0], w[1], w[2]), wp.vec3d(w[3], w[4], w[5])
-    work[0] = work[0] - wp.dot(force, moved) - dt[0] * wp.dot(moment, there.spin[0])
-    pose.x[0] = there.x[0]
-    pose.R[0] = there.R[0]
-    pose.v[0] = there.v[0]
-    pose.spin[0] = there.spin[0]
+@functools.cache
+def _make_settle() -> wp.Kernel:
+    """Kernel: the prescribed pose becomes that of the body; its drive did what bodies took from it."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def settle(
+        wrench: wp.array(dtype=Wrench),
+        there: Pose,
+        dt: wp.array(dtype=wp.float64),
+        pose: Pose,
+        work: wp.array(dtype=wp.float64),
+    ):
+        w, moved = wrench[0], there.x[0] - pose.x[0]
+        force, moment = wp.vec3d(w[0], w[1], w[2]), wp.vec3d(w[3], w[4], w[5])
+        work[0] = work[0] - wp.dot(force, moved) - dt[0] * wp.dot(moment, there.spin[0])
+        pose.x[0] = there.x[0]
+        pose.R[0] = there.R[0]
+        pose.v[0] = there.v[0]
+        pose.spin[0] = there.spin[0]
+
+    return settle
 
 
 class Prescribed(BoundRigidMotion):
@@ -225,7 +230,7 @@ class Prescribed(BoundRigidMotion):
 
     def advance(self, clock: ClockArrays, wrench: wp.array) -> None:
         self.look(clock, 0.0)
-        self._launch.once(_settle, 1, [wrench, self.at, clock.dt, self.pose, self.work])
+        self._launch.once(_make_settle(), 1, [wrench, self.at, clock.dt, self.pose, self.work])
 
 
 @dataclass(frozen=True)

@@ -232,9 +232,15 @@ def _make_power(space: Space) -> wp.Kernel:
     return find_power
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def add_up(step: wp.array(dtype=wp.float64), total: wp.array(dtype=wp.float64)):
-    total[0] = total[0] + step[0]
+@functools.cache
+def make_add_up() -> wp.Kernel:
+    """Kernel: one number onto another."""
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def add_up(step: wp.array(dtype=wp.float64), total: wp.array(dtype=wp.float64)):
+        total[0] = total[0] + step[0]
+
+    return add_up
 
 
 class Wetting:
@@ -299,4 +305,4 @@ class Wetting:
         arguments = [*self._of(), mean, moves, self._own, clock.dt, self._powers]
         self._launch(_make_power(self.space), len(self._wet), arguments)
         self._add(self._powers, self._step)
-        self._launch.once(add_up, 1, [self._step, total])
+        self._launch.once(make_add_up(), 1, [self._step, total])

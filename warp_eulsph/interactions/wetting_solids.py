@@ -16,7 +16,7 @@ from ..scheme.reference import LARGEST_GROWTH
 from ..space import Space
 from ..weights import Weight
 from ..weights.base import pair_weight
-from .wetting import MOST, add_up, grow_across
+from .wetting import MOST, grow_across, make_add_up
 
 if TYPE_CHECKING:
     from ..scheme.medium import Medium
@@ -369,7 +369,7 @@ class WettingOfSolids:
         """Add to ``total`` [J] what solids did in the step to the energy that the liquid stores."""
         self._press_liquid(self._nothing)
         self._add(self._power, self._step)
-        self._launch.once(add_up, 1, [self._step, total])
+        self._launch.once(make_add_up(), 1, [self._step, total])
 
     def evolving(self) -> dict[str, wp.array]:
         """Where all were in the present reference, which of the liquid is wet, and how much of solids it has met."""
