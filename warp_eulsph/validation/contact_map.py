@@ -10,11 +10,10 @@ within the other body, or an end before its time, with the reason). Writes ``con
 """
 
 import argparse
-import csv
 import logging
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ import warp as wp
 from .. import Body, Contact, Current, Material, NeoHookean, Simulation, UnstableError
 from ..geometry import annulus, disc
 from ..materials import J2, LinearHardening
+from . import verdict_maps
 
 _log = logging.getLogger(__name__)
 
@@ -216,10 +216,7 @@ def run(
                 shown = ", ".join(f"{v.speed:g}: {v.verdict} {_percent(v.account)} {v.nearest:.2f}" for v in row)
                 _log.info("%s, %s, %d: %s", problem.name, form, level, shown)
         (output / "contact.md").write_text(table(verdicts), encoding="utf-8")
-        with (output / "contact.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, [field.name for field in fields(Verdict)])
-            writer.writeheader()
-            writer.writerows(asdict(verdict) for verdict in verdicts)
+        verdict_maps.write_csv(Verdict, verdicts, output / "contact.csv")
         draw(verdicts, output / "contact_map.png")
     return verdicts
 
@@ -260,32 +257,18 @@ COLOURS = {"holds": "#4c9f70", "leaks": "#e9d985", "fails": "#c8553d"}
 
 def draw(verdicts: Sequence[Verdict], path: Path) -> None:
     """The map: one panel per problem, forms and resolutions downwards, speed to the right."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    groups = list(_groups(verdicts))
-    most = max(len(rows) for _, rows in groups)
-    high, wide = math.ceil(len(groups) / 2), min(2, len(groups))
-    figure, axes = plt.subplots(high, wide, figsize=(6.5 * wide, 0.3 * high * (most + 3)), squeeze=False)
-    for axis in axes.flat[len(groups) :]:
-        axis.remove()
-    for axis, (name, rows) in zip(axes.flat, groups, strict=False):
-        for i, row in enumerate(rows.values()):
-            for k, v in enumerate(row):
-                axis.add_patch(plt.Rectangle((k, i), 1, 1, facecolor=COLOURS[v.verdict], edgecolor="white"))
-                axis.text(k + 0.5, i + 0.5, _percent(v.account), ha="center", va="center", fontsize=7)
-        speeds = [v.speed for v in row]
-        axis.set(xlim=(0, len(speeds)), ylim=(len(rows), 0), title=name, xlabel="speed over that of pressure waves")
-        axis.set_xticks(np.arange(len(speeds)) + 0.5, [f"{speed:g}" for speed in speeds])
-        axis.set_yticks(np.arange(len(rows)) + 0.5, [f"{form}, {level}" for form, level in rows])
-        axis.tick_params(length=0, labelsize=8)
-    handles = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in COLOURS.values()]
-    figure.legend(handles, COLOURS, ncols=len(COLOURS), loc="upper center", frameon=False)
-    figure.tight_layout(rect=(0, 0, 1, 0.96))
-    figure.savefig(path, dpi=80)
-    plt.close(figure)
+    panels = [
+        verdict_maps.Panel(
+            title=name,
+            along="speed over that of pressure waves",
+            rows=[f"{form}, {level}" for form, level in rows],
+            columns=[v.speed for v in next(iter(rows.values()))],
+            cells=[[(v.verdict, _percent(v.account)) for v in row] for row in rows.values()],
+        )
+        for name, rows in _groups(verdicts)
+    ]
+    most = max(len(panel.rows) for panel in panels)
+    verdict_maps.draw(panels, COLOURS, path, panel_size=(6.5, 0.3 * (most + 3)), label_size=8)
 
 
 def main(argv: Sequence[str] | None = None) -> list[Verdict]:

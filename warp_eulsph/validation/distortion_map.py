@@ -9,15 +9,13 @@ to go on. Writes ``distortion.md``, ``distortion.csv`` and ``distortion_map.png`
 """
 
 import argparse
-import csv
 import logging
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import warp as wp
 
 from .. import (
@@ -33,6 +31,7 @@ from .. import (
     Verlet,
     WhenDistorted,
 )
+from . import verdict_maps
 from .distortion_problems import PROBLEMS, Problem
 
 _log = logging.getLogger(__name__)
@@ -137,7 +136,7 @@ def run(problems: Sequence[Problem], names: Sequence[str], quick: bool, output: 
                 shown = ", ".join(f"{v.distortion:g}: {v.verdict} {_percent(v.error)} {v.reason}" for v in row)
                 _log.info("%s %d %s: %s", problem.name, level, name, shown)
         (output / "distortion.md").write_text(table(verdicts), encoding="utf-8")
-        write_csv(verdicts, output / "distortion.csv")
+        verdict_maps.write_csv(Verdict, verdicts, output / "distortion.csv")
         draw(verdicts, output / "distortion_map.png")
     return verdicts
 
@@ -172,46 +171,24 @@ def table(verdicts: Sequence[Verdict]) -> str:
     return "\n".join(lines)
 
 
-def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:
-    """All verdicts, one per line."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Verdict)])
-        writer.writeheader()
-        writer.writerows(asdict(verdict) for verdict in verdicts)
-
-
 COLOURS = {"accurate": "#4c9f70", "stable": "#e9d985", "stalled": "#b8b8b8", "failed": "#c8553d"}
 
 
 def draw(verdicts: Sequence[Verdict], path: Path) -> None:
     """The map: one panel per problem and level, references downwards, distortion to the right."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    groups = list(_groups(verdicts))
-    rows = math.ceil(len(groups) / 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(11, 2.6 * rows), squeeze=False)
-    for axis in axes.flat[len(groups) :]:
-        axis.remove()
-    for axis, (problem, level, names, marks, cells) in zip(axes.flat, groups, strict=False):
-        for i, name in enumerate(names):
-            for k, mark in enumerate(marks):
-                cell = cells[name, mark]
-                axis.add_patch(plt.Rectangle((k, i), 1, 1, facecolor=COLOURS[cell.verdict], edgecolor="white"))
-                axis.text(k + 0.5, i + 0.5, _percent(cell.error), ha="center", va="center", fontsize=7)
-        axis.set(
-            xlim=(0, len(marks)), ylim=(len(names), 0), title=f"{problem.name}, {level}", xlabel=problem.distortion
+    panels = [
+        verdict_maps.Panel(
+            title=f"{problem.name}, {level}",
+            along=problem.distortion,
+            rows=names,
+            columns=marks,
+            cells=[
+                [(cells[name, mark].verdict, _percent(cells[name, mark].error)) for mark in marks] for name in names
+            ],
         )
-        axis.set_xticks(np.arange(len(marks)) + 0.5, [f"{mark:g}" for mark in marks])
-        axis.set_yticks(np.arange(len(names)) + 0.5, names)
-        axis.tick_params(length=0)
-    handles = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in COLOURS.values()]
-    figure.legend(handles, COLOURS, ncols=len(COLOURS), loc="upper center", frameon=False)
-    figure.tight_layout(rect=(0, 0, 1, 0.97))
-    figure.savefig(path, dpi=80)
-    plt.close(figure)
+        for problem, level, names, marks, cells in _groups(verdicts)
+    ]
+    verdict_maps.draw(panels, COLOURS, path, panel_size=(5.5, 2.6), label_size="medium")
 
 
 def main(argv: Sequence[str] | None = None) -> list[Verdict]:
