@@ -327,7 +327,8 @@ class Medium:
 
     def predict(self, state: StateArrays, out: StateArrays, fraction: float) -> None:
         """``out``, which is S of ``state``, moved by ``fraction`` · Δt (M8)."""
-        arguments = [self.particles, self.of(state), self.smoothed_F_k, self.grad_v, self.forces, self.clock]
+        moving = self.stabiliser.moving(self.grad_v)
+        arguments = [self.particles, self.of(state), self.smoothed_F_k, moving, self.forces, self.clock]
         kernel = make_predict(self.space, self.configuration.fixed, self.moves_surfaces)
         self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
 
@@ -338,7 +339,8 @@ class Medium:
 
     def drift(self, state: StateArrays, rates: StateArrays, fraction: float, out: StateArrays) -> None:
         """F and x of ``state`` moved by ``fraction`` · Δt with v of ``rates``, into ``out`` (M8)."""
-        arguments = [self.configuration.fields, self.of(state), self.of(rates).v, self.grad_v, self.clock]
+        moving = self.stabiliser.moving(self.grad_v)
+        arguments = [self.configuration.fields, self.of(state), self.of(rates).v, moving, self.clock]
         kernel = make_drift(self.space, self.configuration.fixed, self.moves_surfaces)
         self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
 

@@ -59,6 +59,15 @@ def lattice_sum(weight: Weight, dim: int, h: float) -> float:
     return float((g * xi[:, 0] ** 2).sum() * weight.sigma[dim - 1] / h ** (dim + 2))
 
 
+def lattice_kappa(configuration: Configuration) -> np.ndarray:
+    """κ of each particle, (n,): the reciprocal of that sum; reads the device."""
+    particles = configuration.particles
+    ratio = particles.h.numpy().astype(float) / particles.spacing.numpy()
+    known, which = np.unique(ratio.round(6), return_inverse=True)
+    dim = configuration.space.dim
+    return np.array([1.0 / lattice_sum(configuration.weight, dim, float(each)) for each in known])[which]
+
+
 @functools.cache
 def _make_replace(space: Space) -> wp.Kernel:
     """Kernel: L ← κ 1, keeping what it was."""
@@ -135,18 +144,11 @@ class UncorrectedForces(UpwindForces):
         self._L: wp.array | None = None
         self.potentials = Potentials(space, SWEEPS, n, device)
 
-    def _weigh(self, configuration: Configuration) -> None:
-        particles, dim = configuration.particles, self.space.dim
-        ratio = particles.h.numpy().astype(float) / particles.spacing.numpy()
-        known, which = np.unique(ratio.round(6), return_inverse=True)
-        found = np.array([1.0 / lattice_sum(configuration.weight, dim, float(each)) for each in known])
-        self.kappa.assign(found[which])
-        self._L = configuration.fields.L
-
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Take L out of the new reference."""
         if self._L is None:
-            self._weigh(configuration)
+            self.kappa.assign(lattice_kappa(configuration))
+            self._L = configuration.fields.L
         self.potentials.find(configuration, state)
         self._launch(_make_replace(self.space), len(self.kappa), [self.kappa, self._L, self._of_pairs])
 
