@@ -12,7 +12,7 @@ import warp as wp
 from ..linalg import det, reciprocal_cube_root, symmetric_bounds
 from ..space import Space, matrix_type
 from .base import Variable
-from .log_strain import deviatoric_logarithm, exponential
+from .log_strain import strain_functions
 
 #: Begins the history of a law that flows.
 METRIC = Variable(
@@ -28,15 +28,15 @@ class Kinematics(NamedTuple):
 
     Attributes:
         trial: (F, h) -> dev e (full).
-        most: (F, h) -> a bound of |dev e|, without the series: |ln(1 − x)| ≤ x/(1 − x).
-        flowed: (F, h, dev e) -> h whose C_p⁻¹ leaves this of the elastic strain.
+        size: (F, h) -> |dev e|.
+        flowed: (F, h, share) -> h whose C_p⁻¹ leaves this share of dev e.
         rebased: (F, h) -> (F, h) of the same det F and dev e, with what is left of F after plastic flow.
         moduli: (F, h, t, μ, κ) -> (M, μ_s) as ``Law.wave_moduli``, t = tr τ/3, of Ψ = ψ(ln J) + μ |dev e|², ψ'' = κ.
         in_space: full -> its part in the space.
     """
 
     trial: wp.Function
-    most: wp.Function
+    size: wp.Function
     flowed: wp.Function
     rebased: wp.Function
     moduli: wp.Function
@@ -47,9 +47,9 @@ class Kinematics(NamedTuple):
 def elastic_kinematics(space: Space, row: Any) -> Kinematics:
     """The functions for rows of history of this type."""
     real, mat, pair, dim = space.real, space.mat, space.row(2), space.dim
-    full = matrix_type(3, 3, real)
+    full, strain = matrix_type(3, 3, real), space.row(8)
     determinant, bounds, root = det(space), symmetric_bounds(space), reciprocal_cube_root(real)
-    logarithm, exp = deviatoric_logarithm(real), exponential(real)
+    deviator, logarithm, size_of, power = strain_functions(real)
 
     @wp.func
     def extended(F: mat) -> full:
@@ -69,27 +69,29 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
         return out
 
     @wp.func
-    def left_elastic(F: mat, h: row) -> full:
-        """b_e = F C_p⁻¹ Fᵀ."""
-        G = extended(F)
-        return G @ full(h[0], h[3], h[4], h[3], h[1], h[5], h[4], h[5], h[2]) @ wp.transpose(G)
+    def pulled(F: mat, h: row) -> full:
+        """H = F C_p⁻¹."""
+        return extended(F) @ full(h[0], h[3], h[4], h[3], h[1], h[5], h[4], h[5], h[2])
+
+    @wp.func
+    def elastic(F: mat, h: row) -> strain:
+        """What the functions of log_strain.py take of b_e = F C_p⁻¹ Fᵀ."""
+        return deviator(pulled(F, h), extended(F))
 
     @wp.func
     def trial(F: mat, h: row) -> full:
-        return logarithm(left_elastic(F, h)) * real(0.5)
+        return logarithm(elastic(F, h)) * real(0.5)
 
     @wp.func
-    def most(F: mat, h: row) -> real:
-        b = left_elastic(F, h)
-        X = wp.identity(n=3, dtype=real) - b * (real(3.0) / wp.trace(b))
-        norm = wp.sqrt(wp.ddot(X, X))
-        return real(0.5) * norm / wp.max(real(1.0) - norm, real(0.0))
+    def size(F: mat, h: row) -> real:
+        return size_of(elastic(F, h)) * real(0.5)
 
     @wp.func
-    def flowed(F: mat, h: row, e: full) -> row:
-        J = determinant(F)
-        G = wp.inverse(extended(F)) * (J * root(J) * root(J))
-        C = G @ exp(e * real(2.0)) @ wp.transpose(G)
+    def flowed(F: mat, h: row, share: real) -> row:
+        # J^⅔ F⁻¹ exp(2 share dev e) F⁻ᵀ, which is F⁻¹ b_e^share F⁻ᵀ times a number, and F⁻¹ = Hᵀ b_e⁻¹
+        H = pulled(F, h)
+        C = wp.transpose(H) @ power(elastic(F, h), share - real(2.0)) @ H
+        C = C * root(wp.determinant(C))
         out = h
         for k in range(3):
             out[k] = C[k, k]
@@ -103,8 +105,10 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
         out = h
         F_e = F
         if wp.static(dim > 1):
-            J = determinant(F)
-            V = exp(trial(F, h)) * (J * root(J) * root(J))
+            J, V = determinant(F), power(elastic(F, h), real(0.5))  # V times a number
+            ratio = J / wp.determinant(V)
+            V = V * (ratio * root(ratio) * root(ratio))
+            V += V * ((J - wp.determinant(V)) / (real(3.0) * J))  # round-off of det F would add up
             s = real(1.0)
             if wp.static(dim == 2):
                 s = wp.sqrt(V[2, 2])  # so that det F stays J
@@ -121,7 +125,7 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
         # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) with x = 2 (e_i − e_j) for shear. Of the
         # stretches over J^(1/3), squared, a bound a ≥ 1 and c ≤ 1 give logarithms: ln a ≤ a − 1, −ln c ≤ 1/c − 1
         J = determinant(F)
-        b = bounds(in_space(left_elastic(F, h)))
+        b = bounds(in_space(pulled(F, h) @ wp.transpose(extended(F))))
         isochoric = root(J) * root(J)
         largest = b[1] * isochoric
         least = b[0] * isochoric
@@ -133,4 +137,4 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
         M = kappa + real(4.0) / real(3.0) * mu * (real(1.0) + real(0.25) * spread * spread)
         return pair(wp.max(M - t + mu * flattened, shear), shear)
 
-    return Kinematics(trial, most, flowed, rebased, moduli, in_space)
+    return Kinematics(trial, size, flowed, rebased, moduli, in_space)

@@ -1,0 +1,128 @@
+"""Eight particles of `J2` at once against each by itself and against eigenvectors: every dimension and precision."""
+
+import functools
+
+import numpy as np
+import pytest
+import warp as wp
+from points import COPPER, HARDENINGS, KAPPA, MU
+
+from warp_eulsph import Space
+from warp_eulsph.materials import J2
+from warp_eulsph.materials.base import history_row
+from warp_eulsph.materials.in_eights import EIGHT
+
+SPACES = [Space(dim, real) for dim in (1, 2, 3) for real in (wp.float32, wp.float64)]
+COUNT = 5 * EIGHT + 3
+pytestmark = pytest.mark.of_the_cpu
+
+
+@functools.cache
+def make_both(space, law):
+    """Kernels: half step's stress, update, and then stress and energy, singly and by eights."""
+    real, mat, row, C = space.real, space.mat, history_row(space, law), law.Constants
+    stress, energy, update, eights = law.stress, law.energy, law.update, law.eights
+    stress_of, energy_of, update_of = eights
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def singly(
+        F: wp.array(dtype=mat),
+        c: C,
+        h: wp.array(dtype=row),
+        ahead: wp.array(dtype=mat),
+        P: wp.array(dtype=mat),
+        W: wp.array(dtype=wp.float64),
+        lost: wp.array(dtype=real),
+    ):
+        a = wp.tid()
+        ahead[a] = stress(F[a], mat(), h[a], real(1.0), c)
+        _F, h_a, lost_a = update(F[a], mat(), h[a], real(1.0), c)
+        h[a] = h_a
+        lost[a] = lost_a
+        P[a] = stress(F[a], mat(), h_a, real(0.0), c)
+        W[a] = wp.float64(energy(F[a], h_a, c))
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def by_eights(
+        F: wp.array(dtype=mat),
+        c: C,
+        h: wp.array(dtype=row),
+        ahead: wp.array(dtype=mat),
+        P: wp.array(dtype=mat),
+        W: wp.array(dtype=wp.float64),
+        lost: wp.array(dtype=real),
+    ):
+        a = wp.tid() * EIGHT
+        count = wp.min(len(h) - a, EIGHT)
+        stress_of(F, h, a, a, count, real(1.0), c, ahead)
+        update_of(F, h, a, a, count, real(1.0), c, lost)
+        stress_of(F, h, a, a, count, real(0.0), c, P)
+        energy_of(F, h, a, a, count, c, W)
+
+    return singly, by_eights
+
+
+def gradients(space, seed):
+    """F of strains from 1e-6 to 0.5, most of which metals bear and some of which they do not, (COUNT, dim, dim)."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-6.0, -0.3, (COUNT, 1, 1))
+    return np.eye(space.dim) + size * rng.uniform(-0.5, 0.5, (COUNT, space.dim, space.dim))
+
+
+def run(space, law, constants, kernel, threads, steps):
+    """What the kernel leaves after each step."""
+    row = history_row(space, law)
+    h = wp.array([row(*law.start)] * COUNT, dtype=row)
+    found = []
+    for F in steps:
+        ahead, P = (wp.zeros(COUNT, dtype=space.mat) for _ in range(2))
+        W, lost = wp.zeros(COUNT, dtype=wp.float64), wp.zeros(COUNT, dtype=space.real)
+        given = wp.array(F.astype(space.numpy), dtype=space.mat)
+        wp.launch(kernel, threads, [given, constants, h, ahead, P, W, lost])
+        found.append([array.numpy().astype(float) for array in (ahead, P, W, lost, h)])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("space", "name"), [*((space, "voce") for space in SPACES), *((space, "johnson_cook") for space in SPACES[4:])]
+)
+def test_eights_are_those_of_single_particles(space, name):
+    """To round-off of strains of one, whether they yield, return to an earlier surface, or are larger than metals'."""
+    material, eps = J2(**COPPER, hardening=HARDENINGS[name]), np.finfo(space.numpy).eps
+    law = material.law(space)
+    constants = material.filled_constants(law)
+    singly, by_eights = make_both(space, law)
+    first, second = gradients(space, 1), gradients(space, 2)
+    steps = [first, first @ second, second, 1.001 * np.eye(space.dim) @ second]
+    alone = run(space, law, constants, singly, COUNT, steps)
+    together = run(space, law, constants, by_eights, -(-COUNT // EIGHT), steps)
+    yielded = 0
+    for one, eight in zip(alone, together, strict=True):
+        for of_one, of_eight in zip(one[:4], eight[:4], strict=True):  # stresses and energies
+            np.testing.assert_allclose(of_eight, of_one, rtol=0.0, atol=200.0 * eps * KAPPA)
+        np.testing.assert_allclose(eight[4][:, :7], one[4][:, :7], rtol=0.0, atol=200.0 * eps)
+        yielded += int((one[3] > 0.0).sum())
+    assert yielded > COUNT // 2 and (alone[0][3] == 0.0).sum() > 10
+
+
+@pytest.mark.parametrize("real", [wp.float32, wp.float64])
+def test_stress_and_energy_are_those_of_eigenvectors(real):
+    """To round-off of strains of one, before matter yields."""
+    space = Space(3, real)
+    material, eps = J2(**COPPER, hardening=HARDENINGS["perfect"]), np.finfo(space.numpy).eps
+    law = material.law(space)
+    F = gradients(space, 3).astype(space.numpy).astype(float)
+    constants, kernels = material.filled_constants(law), make_both(space, law)
+    values, vectors = np.linalg.eigh(F @ F.swapaxes(1, 2))
+    e, J = 0.5 * np.log(values), np.linalg.det(F)
+    dev = e - e.mean(axis=1, keepdims=True)
+    size = np.linalg.norm(dev, axis=1)
+    elastic = np.sqrt(6.0) * MU * size < 0.4e9
+    assert 10 < elastic.sum() < COUNT
+    tau = (vectors * (2.0 * MU * dev + KAPPA * np.log(J)[:, None])[:, None, :]) @ vectors.swapaxes(1, 2)
+    exact, stored = tau @ np.linalg.inv(F).swapaxes(1, 2), 0.5 * KAPPA * np.log(J) ** 2 + MU * size**2
+    for kernel, threads in zip(kernels, (COUNT, -(-COUNT // EIGHT)), strict=True):
+        _, P, W, lost, _ = run(space, law, constants, kernel, threads, [F])[0]
+        assert (lost[elastic] == 0.0).all() and (lost[~elastic] > 0.0).all()
+        np.testing.assert_allclose(P[elastic], exact[elastic], rtol=0.0, atol=20.0 * eps * KAPPA)
+        np.testing.assert_allclose(W[elastic], stored[elastic], rtol=0.0, atol=20.0 * eps * KAPPA * size.max())
