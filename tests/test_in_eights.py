@@ -21,8 +21,8 @@ pytestmark = pytest.mark.of_the_cpu
 def make_both(space, law):
     """Kernels: half step's stress, update, and then stress and energy, singly and by eights."""
     real, mat, row, C = space.real, space.mat, history_row(space, law), law.Constants
-    stress, energy, update, eights = law.stress, law.energy, law.update, law.eights
-    stress_of, energy_of, update_of = eights
+    stress, energy, moduli, update, pair = law.stress, law.energy, law.wave_moduli, law.update, space.row(2)
+    stress_of, energy_of, moduli_of, update_of = law.eights
 
     @wp.kernel(module="unique", enable_backward=False)
     def singly(
@@ -33,6 +33,7 @@ def make_both(space, law):
         P: wp.array(dtype=mat),
         W: wp.array(dtype=wp.float64),
         lost: wp.array(dtype=real),
+        M: wp.array(dtype=pair),
     ):
         a = wp.tid()
         ahead[a] = stress(F[a], mat(), h[a], real(1.0), c)
@@ -41,6 +42,7 @@ def make_both(space, law):
         lost[a] = lost_a
         P[a] = stress(F[a], mat(), h_a, real(0.0), c)
         W[a] = wp.float64(energy(F[a], h_a, c))
+        M[a] = moduli(F[a], h_a, c)
 
     @wp.kernel(module="unique", enable_backward=False)
     def by_eights(
@@ -51,6 +53,7 @@ def make_both(space, law):
         P: wp.array(dtype=mat),
         W: wp.array(dtype=wp.float64),
         lost: wp.array(dtype=real),
+        M: wp.array(dtype=pair),
     ):
         a = wp.tid() * EIGHT
         count = wp.min(len(h) - a, EIGHT)
@@ -58,6 +61,9 @@ def make_both(space, law):
         update_of(F, h, a, a, count, real(1.0), c, lost)
         stress_of(F, h, a, a, count, real(0.0), c, P)
         energy_of(F, h, a, a, count, c, W)
+        both = moduli_of(F, h, a, a, count, c)
+        for k in range(count):
+            M[a + k] = pair(both[0, k], both[1, k])
 
     return singly, by_eights
 
@@ -78,8 +84,9 @@ def run(space, law, constants, kernel, threads, steps):
         ahead, P = (wp.zeros(COUNT, dtype=space.mat) for _ in range(2))
         W, lost = wp.zeros(COUNT, dtype=wp.float64), wp.zeros(COUNT, dtype=space.real)
         given = wp.array(F.astype(space.numpy), dtype=space.mat)
-        wp.launch(kernel, threads, [given, constants, h, ahead, P, W, lost])
-        found.append([array.numpy().astype(float) for array in (ahead, P, W, lost, h)])
+        M = wp.zeros(COUNT, dtype=space.row(2))
+        wp.launch(kernel, threads, [given, constants, h, ahead, P, W, lost, M])
+        found.append([array.numpy().astype(float) for array in (ahead, P, W, lost, M, h)])
     return found
 
 
@@ -98,9 +105,9 @@ def test_eights_are_those_of_single_particles(space, name):
     together = run(space, law, constants, by_eights, -(-COUNT // EIGHT), steps)
     yielded = 0
     for one, eight in zip(alone, together, strict=True):
-        for of_one, of_eight in zip(one[:4], eight[:4], strict=True):  # stresses and energies
+        for of_one, of_eight in zip(one[:5], eight[:5], strict=True):  # stresses, energies, moduli
             np.testing.assert_allclose(of_eight, of_one, rtol=0.0, atol=200.0 * eps * KAPPA)
-        np.testing.assert_allclose(eight[4][:, :7], one[4][:, :7], rtol=0.0, atol=200.0 * eps)
+        np.testing.assert_allclose(eight[5][:, :7], one[5][:, :7], rtol=0.0, atol=200.0 * eps)
         yielded += int((one[3] > 0.0).sum())
     assert yielded > COUNT // 2 and (alone[0][3] == 0.0).sum() > 10
 
@@ -122,7 +129,7 @@ def test_stress_and_energy_are_those_of_eigenvectors(real):
     tau = (vectors * (2.0 * MU * dev + KAPPA * np.log(J)[:, None])[:, None, :]) @ vectors.swapaxes(1, 2)
     exact, stored = tau @ np.linalg.inv(F).swapaxes(1, 2), 0.5 * KAPPA * np.log(J) ** 2 + MU * size**2
     for kernel, threads in zip(kernels, (COUNT, -(-COUNT // EIGHT)), strict=True):
-        _, P, W, lost, _ = run(space, law, constants, kernel, threads, [F])[0]
+        _, P, W, lost, _, _ = run(space, law, constants, kernel, threads, [F])[0]
         assert (lost[elastic] == 0.0).all() and (lost[~elastic] > 0.0).all()
         np.testing.assert_allclose(P[elastic], exact[elastic], rtol=0.0, atol=20.0 * eps * KAPPA)
         np.testing.assert_allclose(W[elastic], stored[elastic], rtol=0.0, atol=20.0 * eps * KAPPA * size.max())

@@ -42,7 +42,7 @@ class Variable(NamedTuple):
 
 
 class Eights(NamedTuple):
-    """Stress, energy and update of ``count`` particles, eight or fewer, at once: for the CPU, where that is faster.
+    """A law for ``count`` particles, eight or fewer, at once: on the CPU, where that is faster.
 
     Functions, ``wp.func``, of (F, history, first, own, count, …), arrays with the particles' F from ``first`` and their
     histories from ``own`` on; equal to those of the law up to round-off.
@@ -50,11 +50,13 @@ class Eights(NamedTuple):
     Attributes:
         stress: (…, Δt, constants, P): P from ``first`` on.
         energy: (…, constants, Ψ): Ψ [J/m^d] from ``first`` on, in float64.
+        wave_moduli: (…, constants) -> (2, 8): M and μ of each.
         update: (…, Δt, constants, lost): histories, and the energy dissipated per initial volume from ``first`` on.
     """
 
     stress: wp.Function
     energy: wp.Function
+    wave_moduli: wp.Function
     update: wp.Function
 
 

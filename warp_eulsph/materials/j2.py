@@ -8,11 +8,11 @@ from typing import Any
 import warp as wp
 
 from ..linalg import cofactor, det
-from ..space import Space
+from ..space import Space, matrix_type
 from .base import Eights, Isotropic, Law, Variable, history_row, lame_constants
 from .hardening import Hardening
 from .in_eights import EIGHT, plastic_eights
-from .plastic_metric import METRIC, elastic_kinematics
+from .plastic_metric import METRIC, elastic_kinematics, moduli_of_size
 
 STRAIN = Variable("plastic_strain", "-", "equivalent plastic strain", least=0.0)
 WORK = Variable("plastic_work", "J/m^3", "plastic work per initial volume", least=0.0)
@@ -184,7 +184,8 @@ def _in_eights(space: Space, law: Law, flow: wp.Function, flown: wp.Function, st
     """The law's stress, energy and update for eight particles at once."""
     real, mat, row, Constants = space.real, space.mat, history_row(space, law), law.Constants
     eight, (measure, stress_of, flow_of) = space.row(EIGHT), plastic_eights(space, row)
-    one_stress, one_energy, one_update = law.stress, law.energy, law.update
+    pair, two_eights, of_size = space.row(2), matrix_type(2, EIGHT, real), moduli_of_size(real)
+    one_stress, one_energy, one_update, moduli_of = law.stress, law.energy, law.update, law.wave_moduli
 
     @wp.func
     def stress(
@@ -225,6 +226,21 @@ def _in_eights(space: Space, law: Law, flow: wp.Function, flown: wp.Function, st
                 out[first + k] = wp.float64(one_energy(F[first + k], history[own + k], c))
 
     @wp.func
+    def wave_moduli(
+        F: wp.array(dtype=mat), history: wp.array(dtype=row), first: int, own: int, count: int, c: Constants
+    ) -> two_eights:
+        size, out = measure(F, history, first, own, count), two_eights()
+        for k in range(count):
+            M = pair()
+            if wp.static(space.dim == 3) and size[0, k] == size[0, k]:
+                M = of_size(size[0, k], c.kappa * size[1, k], c.mu, c.kappa)
+            else:
+                M = moduli_of(F[first + k], history[own + k], c)
+            out[0, k] = M[0]
+            out[1, k] = M[1]
+        return out
+
+    @wp.func
     def update(
         F: wp.array(dtype=mat),
         history: wp.array(dtype=row),
@@ -253,4 +269,4 @@ def _in_eights(space: Space, law: Law, flow: wp.Function, flown: wp.Function, st
         if any_flows:
             flow_of(F, history, first, own, count, left)
 
-    return Eights(stress, energy, update)
+    return Eights(stress, energy, wave_moduli, update)

@@ -5,6 +5,7 @@ law does to volume is a number of its own.
 """
 
 import functools
+import math
 from typing import Any, NamedTuple
 
 import warp as wp
@@ -44,11 +45,43 @@ class Kinematics(NamedTuple):
 
 
 @functools.cache
+def elastic_moduli(real: type) -> wp.Function:
+    """``wp.func`` (below, apart, t, μ, κ) -> (M, μ_s) as ``Law.wave_moduli`` of Ψ = ψ(ln J) + μ |dev e|² with ψ'' = κ.
+
+    t = tr τ/3; of 2 dev e the least eigenvalue is no more ``below`` zero, and eigenvalues are no more ``apart``.
+    """
+    pair = Space(3, real).row(2)
+
+    @wp.func
+    def elastic_moduli(below: real, apart: real, t: real, mu: real, kappa: real) -> pair:
+        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) ≤ μ (1 + x) with x = 2 (e_i − e_j) for shear
+        shear = mu * (real(1.0) + apart)
+        M = kappa + real(4.0) / real(3.0) * mu * (real(1.0) + real(0.25) * apart * apart)
+        return pair(wp.max(M - t + mu * below, shear), shear)
+
+    return elastic_moduli
+
+
+@functools.cache
+def moduli_of_size(real: type) -> wp.Function:
+    """``wp.func`` (|dev e|, t, μ, κ) -> the same where the eigenvalues are three in sum zero: √(2/3) and √2 |dev e|."""
+    pair, moduli = Space(3, real).row(2), elastic_moduli(real)
+    below, apart = 2.0 * math.sqrt(2.0 / 3.0), 2.0 * math.sqrt(2.0)
+
+    @wp.func
+    def moduli_of_size(size: real, t: real, mu: real, kappa: real) -> pair:
+        return moduli(real(below) * size, real(apart) * size, t, mu, kappa)
+
+    return moduli_of_size
+
+
+@functools.cache
 def elastic_kinematics(space: Space, row: Any) -> Kinematics:
     """The functions for rows of history of this type."""
     real, mat, pair, dim = space.real, space.mat, space.row(2), space.dim
     full, strain = matrix_type(3, 3, real), space.row(8)
     determinant, bounds, root = det(space), symmetric_bounds(space), reciprocal_cube_root(real)
+    of_size, of_bounds = moduli_of_size(real), elastic_moduli(real)
     deviator, logarithm, size_of, power = strain_functions(real)
 
     @wp.func
@@ -122,19 +155,12 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
 
     @wp.func
     def moduli(F: mat, h: row, t: real, mu: real, kappa: real) -> pair:
-        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) with x = 2 (e_i − e_j) for shear. Of the
-        # stretches over J^(1/3), squared, a bound a ≥ 1 and c ≤ 1 give logarithms: ln a ≤ a − 1, −ln c ≤ 1/c − 1
-        J = determinant(F)
-        b = bounds(in_space(pulled(F, h) @ wp.transpose(extended(F))))
-        isochoric = root(J) * root(J)
-        largest = b[1] * isochoric
-        least = b[0] * isochoric
         if wp.static(dim == 3):
-            least = wp.max(least, real(1.0) / (largest * largest))  # the bound may be negative, the determinant is 1
-        flattened = real(1.0) / least - real(1.0)
-        spread = largest - real(1.0) + flattened
-        shear = mu * (real(1.0) + spread)
-        M = kappa + real(4.0) / real(3.0) * mu * (real(1.0) + real(0.25) * spread * spread)
-        return pair(wp.max(M - t + mu * flattened, shear), shear)
+            return of_size(size(F, h), t, mu, kappa)
+        # Of the stretches over J^(1/3), squared, the largest and the least in the space: ln a ≤ a − 1, −ln c ≤ 1/c − 1
+        J = determinant(F)
+        b = bounds(in_space(pulled(F, h) @ wp.transpose(extended(F)))) * (root(J) * root(J))
+        below = real(1.0) / b[0] - real(1.0)
+        return of_bounds(below, b[1] - real(1.0) + below, t, mu, kappa)
 
     return Kinematics(trial, size, flowed, rebased, moduli, in_space)

@@ -109,8 +109,14 @@ class Flux:
         """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
         for kind in self.kinds:
             arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields]
-            kernel = kernels.make_wave_speeds(self.space, kind.law, kind.several, configuration.fixed)
-            self._launch(kernel, kind.size, [*arguments, kind.laws, self.fields, clock], kind.first)
+            arguments += [kind.laws, self.fields, clock]
+            eights, fixed = self._eights(kind), configuration.fixed
+            if eights is not None:
+                kernel = flux_eights.make_wave_speeds(self.space, kind.law, eights, fixed)
+                self._launch_eights(kind, kernel, arguments)
+            else:
+                kernel = kernels.make_wave_speeds(self.space, kind.law, kind.several, fixed)
+                self._launch(kernel, kind.size, arguments, kind.first)
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""

@@ -1,4 +1,4 @@
-"""Stress, energy and histories of laws that have them for eight particles at once (``Law.eights``): on the CPU.
+"""Stress, waves, energy and histories of laws that have them for eight particles at once (``Law.eights``): on the CPU.
 
 A thread has a block of eight particles of one kind of law. Parameters are those of the kernels of ``flux_kernels.py``.
 """
@@ -12,7 +12,7 @@ from ..materials import Law
 from ..materials.base import Eights, history_row
 from ..materials.in_eights import EIGHT
 from ..space import Space
-from .flux_kernels import keep_flux, keep_update
+from .flux_kernels import keep_flux, keep_speeds, keep_update
 from .laws import laws_structure
 
 
@@ -45,6 +45,36 @@ def make_flux(space: Space, law: Law, eights: Eights, fixed: bool, dual: bool) -
                 keep(b, flux.Q[b], reference, flux)
 
     return compute_flux
+
+
+@functools.cache
+def make_wave_speeds(space: Space, law: Law, eights: Eights, fixed: bool) -> wp.Kernel:
+    """Kernel: the wave speeds."""
+    mat, row, pair, moduli = space.mat, history_row(space, law), space.row(2), eights.wave_moduli
+    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
+    Laws, Clock, keep = laws_structure(law), clock_structure(space), keep_speeds(space, law, fixed)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def wave_speeds(
+        first: int,
+        begin: int,
+        F: wp.array(dtype=mat),
+        grad_v: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        particles: Particles,
+        reference: Reference,
+        laws: Laws,
+        flux: Flux,
+        clock: Clock,
+    ):
+        own = (first + wp.tid()) * EIGHT
+        count, a, c = wp.min(len(history) - own, EIGHT), begin + own, laws.constants[0]
+        M = moduli(F, history, a, own, count, c)
+        for k in range(count):
+            b, of_b = a + k, pair(M[0, k], M[1, k])
+            keep(b, of_b, F[b], grad_v[b], history[own + k], c, particles, reference, flux, clock)
+
+    return wave_speeds
 
 
 @functools.cache

@@ -104,14 +104,67 @@ STRAIN = 0.25
 
 
 @functools.cache
-def make_wave_speeds(space: Space, law: Law, several: bool, fixed: bool) -> wp.Kernel:
-    real, mat = space.real, space.mat
+def keep_speeds(space: Space, law: Law, fixed: bool) -> wp.Function:
+    """``wp.func`` that keeps the wave speeds of particle a, of wave moduli M, and raises the rate of the clock."""
+    real, mat, pair, row, dim = space.real, space.mat, space.row(2), history_row(space, law), float(space.dim)
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
-    Clock, Laws, dim = clock_structure(space), laws_structure(law), float(space.dim)
-    row, remembers, moduli = history_row(space, law), bool(law.history), long_form(space, law).wave_moduli
+    Clock, Constants, invert, shortening_of = (
+        clock_structure(space),
+        law.Constants,
+        inverse(space),
+        largest_shortening(space),
+    )
     drag_of, viscous, rate_of = law.viscosity, law.viscosity is not None, velocity_gradient(space, fixed)
-    invert, shortening_of = inverse(space), largest_shortening(space)
     raise_rate, resolution_of, with_viscosity = raise_to(real), resolution(space), rate_with_viscosity(real)
+
+    @wp.func
+    def keep_speeds(
+        a: int,
+        M: pair,
+        F: mat,
+        grad_v: mat,
+        h: row,
+        c: Constants,
+        particles: Particles,
+        reference: Reference,
+        flux: Flux,
+        clock: Clock,
+    ):
+        # A wave of speed c runs at c |G⁻¹| when distances are measured in the reference, G = F F_k⁻¹.
+        G = F
+        if wp.static(not fixed):
+            G = G @ invert(reference.F[a])
+        shortening = shortening_of(G)  # squared
+        per_density = shortening * particles.V0[a] / particles.mass[a]
+        speed = wp.sqrt(wp.max(M[0], real(0.0)) * per_density)
+        shear_speed = wp.sqrt(wp.max(M[1], real(0.0)) * per_density)
+        rho_k = particles.mass[a] / reference.V[a]
+        flux.speed[a] = speed
+        flux.impedance[a] = rho_k * speed
+        flux.shear_impedance[a] = rho_k * shear_speed
+        if wp.static(fixed):
+            per_length = reference.resolution[a]
+        else:
+            per_length = resolution_of(a, particles, reference)
+        rate = speed * per_length
+        if wp.static(viscous):
+            nu = drag_of(F, rate_of(a, F, grad_v, reference), h, c) * per_density
+            rate = with_viscosity(rate, nu * per_length * per_length)
+        # |∇v G⁻¹| ≤ |∇v| |G⁻¹| and, of the bound, |G⁻¹|² ≤ d · shortening: seldom is more than that asked for
+        strain_rate = real(STRAIN) * rate
+        if wp.ddot(grad_v, grad_v) * shortening * real(dim) > strain_rate * strain_rate:
+            D = grad_v @ invert(G)
+            rate = wp.max(rate, wp.sqrt(wp.ddot(D, D)) / real(STRAIN))
+        raise_rate(clock.rate, rate)
+
+    return keep_speeds
+
+
+@functools.cache
+def make_wave_speeds(space: Space, law: Law, several: bool, fixed: bool) -> wp.Kernel:
+    mat, row, remembers, keep = space.mat, history_row(space, law), bool(law.history), keep_speeds(space, law, fixed)
+    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
+    Clock, Laws, moduli = clock_structure(space), laws_structure(law), long_form(space, law).wave_moduli
     constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -129,36 +182,10 @@ def make_wave_speeds(space: Space, law: Law, several: bool, fixed: bool) -> wp.K
     ):
         a = first + wp.tid()
         c = constants_of(a, particles, laws)
-        # A wave of speed c runs at c |G⁻¹| when distances are measured in the reference, G = F F_k⁻¹.
-        G = F[a]
-        if wp.static(not fixed):
-            G = G @ invert(reference.F[a])
-        shortening = shortening_of(G)  # squared
         h = row()
         if wp.static(remembers):
             h = history[a - begin]
-        M = moduli(F[a], h, c)
-        per_density = shortening * particles.V0[a] / particles.mass[a]
-        speed = wp.sqrt(wp.max(M[0], real(0.0)) * per_density)
-        shear_speed = wp.sqrt(wp.max(M[1], real(0.0)) * per_density)
-        rho_k = particles.mass[a] / reference.V[a]
-        flux.speed[a] = speed
-        flux.impedance[a] = rho_k * speed
-        flux.shear_impedance[a] = rho_k * shear_speed
-        if wp.static(fixed):
-            per_length = reference.resolution[a]
-        else:
-            per_length = resolution_of(a, particles, reference)
-        rate = speed * per_length
-        if wp.static(viscous):
-            nu = drag_of(F[a], rate_of(a, F[a], grad_v[a], reference), h, c) * per_density
-            rate = with_viscosity(rate, nu * per_length * per_length)
-        # |∇v G⁻¹| ≤ |∇v| |G⁻¹| and, of the bound, |G⁻¹|² ≤ d · shortening: seldom is more than that asked for
-        strain_rate = real(STRAIN) * rate
-        if wp.ddot(grad_v[a], grad_v[a]) * shortening * real(dim) > strain_rate * strain_rate:
-            D = grad_v[a] @ invert(G)
-            rate = wp.max(rate, wp.sqrt(wp.ddot(D, D)) / real(STRAIN))
-        raise_rate(clock.rate, rate)
+        keep(a, moduli(F[a], h, c), F[a], grad_v[a], h, c, particles, reference, flux, clock)
 
     return wave_speeds
 
