@@ -7,7 +7,9 @@ import pytest
 import warp as wp
 from points import COPPER, HARDENINGS, KAPPA, MU
 
-from warp_eulsph import Space
+import warp_eulsph as es
+from warp_eulsph import Space, execution
+from warp_eulsph.geometry import box
 from warp_eulsph.materials import J2
 from warp_eulsph.materials.base import history_row
 from warp_eulsph.materials.in_eights import EIGHT
@@ -135,3 +137,26 @@ def test_stress_and_energy_are_those_of_eigenvectors(real):
         assert (lost[elastic] == 0.0).all() and (lost[~elastic] > 0.0).all()
         np.testing.assert_allclose(P[elastic], exact[elastic], rtol=0.0, atol=20.0 * eps * KAPPA)
         np.testing.assert_allclose(W[elastic], stored[elastic], rtol=0.0, atol=20.0 * eps * KAPPA * size.max())
+
+
+@pytest.mark.parametrize("reference", [es.Never(), es.Always()])
+def test_steps_keep_every_bit_and_are_those_of_portable_kernels(reference):
+    """With threads, whose ranges of blocks are others, and as graphs; the last of 17³ is a block of its own."""
+    x, volume = box((0.0,) * 3, (1.0,) * 3, 1.0 / 17)
+    velocity = 100.0 * np.stack([x[:, 1], np.sin(3.0 * x[:, 0]), 0.0 * x[:, 0]], axis=1)
+    found = []
+    for threads, graphs, simd in ((1, False, True), (2, False, True), (1, True, True), (1, False, False)):
+        execution.set_threads(threads)
+        execution.set_graphs(graphs)
+        execution.set_simd(simd)
+        material = J2(**COPPER, hardening=HARDENINGS["linear"])
+        body = es.Body(x=x, volume=volume, spacing=1.0 / 17, material=material, velocity=velocity)
+        simulation = es.Simulation(body, reference=reference, time_step=es.TimeStep(fixed=2e-6))
+        simulation.step(20)
+        found.append([simulation.x, simulation.history("plastic_strain"), simulation.history("plastic_metric")])
+    first, *same, portable = ([array.copy() for array in each] for each in found)
+    assert 100 < (first[1] > 0.0).sum() < len(x)
+    for other in same:
+        assert all(np.array_equal(a, b) for a, b in zip(first, other, strict=True))
+    for a, b in zip(first, portable, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-11)

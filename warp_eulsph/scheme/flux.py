@@ -1,13 +1,13 @@
 """The flux of momentum: stress in the reference, body by body (M1), the wave speeds there, and what laws remember."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import warp as wp
 
 from ..execution import Launcher, simd
 from ..fields import allocate
-from ..materials import Material
+from ..materials import Law, Material
 from ..materials.base import Eights, history_row
 from ..materials.in_eights import EIGHT
 from ..space import Space
@@ -93,65 +93,72 @@ class Flux:
 
         F is ``fraction`` Δt ahead of the histories, moved by ``grad_v`` = ∇_k v.
         """
-        fixed, dual = configuration.fixed, len(self.fields.Pi) > 0
+        space, fixed, dual = self.space, configuration.fixed, len(self.fields.Pi) > 0
         for kind in self.kinds:
             arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields, clock, fraction]
-            arguments += [kind.laws, self.fields]
-            eights = self._eights(kind)
-            if eights is not None:
-                kernel = flux_eights.make_flux(self.space, kind.law, eights, fixed, dual)
-                self._launch_eights(kind, kernel, arguments)
-            else:
-                kernel = kernels.make_flux(self.space, kind.law, kind.several, fixed, dual)
-                self._launch(kernel, kind.size, arguments, kind.first)
+            self._run(
+                kind,
+                [*arguments, kind.laws, self.fields],
+                lambda law, several: kernels.make_flux(space, law, several, fixed, dual),
+                lambda law, eights: flux_eights.make_flux(space, law, eights, fixed, dual),
+            )
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
+        space, fixed = self.space, configuration.fixed
         for kind in self.kinds:
             arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields]
-            arguments += [kind.laws, self.fields, clock]
-            eights, fixed = self._eights(kind), configuration.fixed
-            if eights is not None:
-                kernel = flux_eights.make_wave_speeds(self.space, kind.law, eights, fixed)
-                self._launch_eights(kind, kernel, arguments)
-            else:
-                kernel = kernels.make_wave_speeds(self.space, kind.law, kind.several, fixed)
-                self._launch(kernel, kind.size, arguments, kind.first)
+            self._run(
+                kind,
+                [*arguments, kind.laws, self.fields, clock],
+                lambda law, several: kernels.make_wave_speeds(space, law, several, fixed),
+                lambda law, eights: flux_eights.make_wave_speeds(space, law, eights, fixed),
+            )
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""
+        space = self.space
         for kind in self.kinds:
             arguments = [kind.first, F, kind.history, self.particles, kind.laws, out]
-            eights = self._eights(kind)
-            if eights is not None:
-                self._launch_eights(kind, flux_eights.make_energy(self.space, kind.law, eights), arguments)
-            else:
-                self._launch(kernels.make_energy(self.space, kind.law, kind.several), kind.size, arguments, kind.first)
+            self._run(
+                kind,
+                arguments,
+                lambda law, several: kernels.make_energy(space, law, several),
+                lambda law, eights: flux_eights.make_energy(space, law, eights),
+            )
 
     def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """After a full step that ``grad_v`` = ∇_k v made: what each law keeps of F, its history, what it dissipated."""
+        space, fixed, tied = self.space, configuration.fixed, len(self.fields.slipped) > 0
         for kind in self.kinds:
             law = kind.law
             if law.history and law.update is not None:
                 arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields, clock]
-                arguments += [kind.laws, self.fields]
-                tied = law.secant is not None and len(self.fields.slipped) > 0
-                eights = self._eights(kind)
-                if eights is not None:
-                    self._launch_eights(kind, flux_eights.make_update(self.space, law, eights, tied), arguments)
-                else:
-                    kernel = kernels.make_update(self.space, law, kind.several, configuration.fixed, tied)
-                    self._launch(kernel, kind.size, arguments, kind.first)
+                self._run(
+                    kind,
+                    [*arguments, kind.laws, self.fields],
+                    lambda law, several: kernels.make_update(
+                        space, law, several, fixed, law.secant is not None and tied
+                    ),
+                    lambda law, eights: flux_eights.make_update(space, law, eights, law.secant is not None and tied),
+                )
             elif law.update is not None:
                 kernel = kernels.make_forget(self.space, law, kind.several)
                 self._launch(kernel, kind.size, [F, self.particles, kind.laws], kind.first)
 
-    def _eights(self, kind: Kind) -> Eights | None:
-        """What to take eight particles at once by, if that is to be done."""
-        return kind.law.eights if self._simd and not kind.several else None
-
-    def _launch_eights(self, kind: Kind, kernel: wp.Kernel, arguments: Sequence[Any]) -> None:
-        self._launch(kernel, -(-kind.size // EIGHT), arguments, each=EIGHT)
+    def _run(
+        self,
+        kind: Kind,
+        arguments: Sequence[Any],
+        make: Callable[[Law, bool], wp.Kernel],
+        make_of_eights: Callable[[Law, Eights], wp.Kernel],
+    ) -> None:
+        """Launch over the particles of a kind, eight at once where that is to be done."""
+        law = kind.law
+        if law.eights is None or kind.several or not self._simd:
+            self._launch(make(law, kind.several), kind.size, arguments, kind.first)
+        else:
+            self._launch(make_of_eights(law, law.eights), -(-kind.size // EIGHT), arguments, each=EIGHT)
 
     def rebase(self, F: wp.array) -> None:
         """Before a refresh: F and histories as the new reference takes them."""
