@@ -99,6 +99,10 @@ class BalancedPairs(UpwindForces):
         """The potentials that shifting (M15) follows before the next refresh."""
         return {"BalancedPairs.psi": self.potentials.psi}
 
+    def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
+        """It cannot: gradients join balanced positions, the rest of M9 those of the particles."""
+        return False
+
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Balance the new reference."""
         reference, near, simd = configuration.fields, configuration.near, configuration.simd

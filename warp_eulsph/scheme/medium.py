@@ -1,7 +1,7 @@
 """A medium: bodies that share the reference and the options of the scheme, and each line of a step on them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -176,6 +176,8 @@ class Medium:
         if self.exchanges:
             self.flux.keep_dissipated()
             self.volumes = VolumeFlux(self.space, self.flux, self.particles, own, self.device)
+            if self.stabiliser.sums_pressure(self.configuration, self.sums.sensor is not None):
+                self.sums = replace(self.sums, grad_p=self.volumes.grad_p)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
