@@ -90,6 +90,8 @@ def _make_correct(space: Space, simd: bool) -> wp.Kernel:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
+    balances = True
+
     def __init__(self, option: Balance, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
         super().__init__(space, device)
         self.option, self.particles = option, particles
@@ -98,10 +100,6 @@ class BalancedPairs(UpwindForces):
     def evolving(self) -> dict[str, wp.array]:
         """The potentials that shifting (M15) follows before the next refresh."""
         return {"BalancedPairs.psi": self.potentials.psi}
-
-    def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
-        """It cannot: gradients join balanced positions, the rest of M9 those of the particles."""
-        return False
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Balance the new reference."""

@@ -169,8 +169,8 @@ class UpwindForces(Stabiliser):
         return not configuration.pairs_by_simd(sensed)
 
     def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
-        """The SIMD pass can."""
-        return not self.takes_dual(configuration, sensed)
+        """The SIMD pass can, along the pairs of M9."""
+        return not self.balances and not self.takes_dual(configuration, sensed)
 
     def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
         """Internal force (M5) and dissipation (M9)."""

@@ -217,9 +217,16 @@ class Medium:
         self.configuration.move(self.of(state))
 
     def renew(self, state: StateArrays) -> None:
-        """Neighbours and corrections of the new reference (M3), and what the options add."""
-        self.configuration.renew()
+        """Neighbours and corrections of the new reference (M3), what the options add, ∇_k v where it is kept."""
+        v, configuration = self.of(state).v, self.configuration
+        early = self.steady and not self.stabiliser.balances and configuration.sums_with_weights
+        configuration.renew(v, self.kept if early else None)
         self.stabilise(state)
+        if early:
+            configuration.finish_gradient(self.kept)
+            self.walls.add_gradient(v, self.kept)
+        else:
+            self.keep_gradient(state)
 
     def stabilise(self, state: StateArrays) -> None:
         """Prepare the stabiliser for a new reference, and what else depends on it."""

@@ -54,6 +54,8 @@ class Stabiliser(ABC):
 
     #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
     corrects: ClassVar[bool] = True
+    #: Whether gradients join balanced positions (M13), and not those of the particles.
+    balances: ClassVar[bool] = False
     #: Whether walls take part in the sums (M28).
     takes_walls: ClassVar[bool] = False
     #: Of corrections that have them (``Correction.has_potentials``).

@@ -5,20 +5,17 @@ from collections.abc import Callable
 
 import warp as wp
 
-from ..execution import Launcher, simd
+from ..execution import Launcher
 from ..fields import clock_structure, neighbour_structure, structure
 from ..materials import Law
 from ..materials.base import history_row, long_form
-from ..simd import BY_EIGHT, OWN_ROW, packed_rows, prelude
+from ..operators.correction import VECTORS
+from ..simd import BY_EIGHT, OWN_ROW, prelude
 from ..space import Space, difference
 from ..structs import ClockArrays, ParticleArrays
 from .flux import Flux
 from .pair_forces import pressure_of
 from .stabiliser import Sums
-
-# Rows of four that the SIMD pass reads of a neighbour.
-VECTORS = 2
-
 
 @functools.cache
 def _make_pressure(space: Space) -> wp.Kernel:
@@ -213,7 +210,6 @@ class VolumeFlux:
         self._launch, n = Launcher(device), len(change)
         self._p = wp.zeros(n, dtype=space.row(1), device=device)
         self.grad_p = wp.zeros(n, dtype=space.row_gradient(1), device=device)
-        self._rows = packed_rows(space, n if simd(device) else 0, VECTORS, device)
 
     def find(self, sums: Sums, exact: Callable[[wp.array], wp.array], clock: ClockArrays) -> None:
         """ΔV/V of the step, by the pressures that it was made with."""
@@ -224,8 +220,9 @@ class VolumeFlux:
         gradient = exact(self.grad_p)
         fields, near = configuration.fields, configuration.near
         if configuration.simd:
-            self._launch(_make_pack(self.space), n, [fields, sums.flux, self._p, gradient, self._rows])
-            arguments = [near, self._rows, sums.epsilon, clock, self.change]
+            rows = configuration.rows
+            self._launch(_make_pack(self.space), n, [fields, sums.flux, self._p, gradient, rows])
+            arguments = [near, rows, sums.epsilon, clock, self.change]
             self._launch(_make_exchange_simd(self.space), n, arguments)
             return
         arguments = [fields, near, sums.flux, self._p, gradient, sums.epsilon, clock, self.change]
