@@ -78,9 +78,8 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
-        surface_given: the bodies came with their area vectors.
+        surface_given: the bodies came with their area vectors. walls: what takes part in its sums from outside.
         stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
-        walls: what takes part in its sums from outside.
         breaking, heating, volumes: None where no law fails, none takes heat, no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
@@ -218,13 +217,12 @@ class Medium:
 
     def renew(self, state: StateArrays) -> None:
         """Neighbours and corrections of the new reference (M3), what the options add, ∇_k v where it is kept."""
-        v, configuration = self.of(state).v, self.configuration
-        early = self.steady and not self.stabiliser.balances and configuration.sums_with_weights
-        configuration.renew(v, self.kept if early else None)
+        early = self.steady and not self.stabiliser.balances and self.configuration.sums_with_weights
+        self.configuration.renew(self.of(state).v, self.kept if early else None)
         self.stabilise(state)
         if early:
-            configuration.finish_gradient(self.kept)
-            self.walls.add_gradient(v, self.kept)
+            self.configuration.finish_gradient(self.kept)
+            self.walls.add_gradient(self.of(state).v, self.kept)
         else:
             self.keep_gradient(state)
 

@@ -17,6 +17,7 @@ from .flux import Flux
 from .pair_forces import pressure_of
 from .stabiliser import Sums
 
+
 @functools.cache
 def _make_pressure(space: Space) -> wp.Kernel:
     """Kernel: p of the stress in the reference."""
