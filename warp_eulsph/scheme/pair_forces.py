@@ -6,7 +6,7 @@ import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
-from ..simd import BY_EIGHT, OWN_ROW, packed_rows, prelude
+from ..simd import BY_EIGHT, OWN_ROW, prelude
 from ..space import Space
 from ..structs import FluxArrays, ForceArrays
 from .reference import Configuration
@@ -69,6 +69,7 @@ def _make_pack(space: Space) -> wp.Kernel:
             rows[a, i] = x_a[i]
             rows[a, 4 + i] = v_a[i]
             rows[a, 8 + i] = now_a[i]
+            rows[a, first_grad + 4 * i + 3] = real(0.0)  # is added to the shear impedance
             rows[a, first_Pi + 4 * i + 3] = balanced_a[i]
             for j in range(wp.static(dim)):
                 rows[a, first_grad + 4 * j + i] = grad_a[i, j] * real(-0.5)
@@ -182,12 +183,11 @@ def _make_forces(space: Space, pressure: bool) -> wp.Kernel:
 
 
 class PairForces:
-    """The pass at work on n particles."""
+    """The pass at work."""
 
-    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
+    def __init__(self, space: Space, device: wp.DeviceLike):
         self.space, self._launch = space, Launcher(device)
         self._no_p = wp.zeros(0, dtype=space.row_gradient(1), device=device)
-        self._rows = packed_rows(space, n, _vectors(space), device)
 
     def compute(
         self,
@@ -201,8 +201,8 @@ class PairForces:
         grad_p: wp.array | None,
     ) -> None:
         """``forces.internal`` (M5) and ``forces.dissipation`` (M9 without a sensor) [N], and ``grad_p`` if given."""
-        n = len(v)
-        self._launch(_make_pack(self.space), n, [configuration.fields, flux, x, v, grad_v, self._rows])
-        arguments = [configuration.fields, configuration.near, self._rows, epsilon]
+        n, rows = len(v), configuration.packed(_vectors(self.space))
+        self._launch(_make_pack(self.space), n, [configuration.fields, flux, x, v, grad_v, rows])
+        arguments = [configuration.fields, configuration.near, rows, epsilon]
         arguments += [forces.internal, forces.dissipation, self._no_p if grad_p is None else grad_p]
         self._launch(_make_forces(self.space, grad_p is not None), n, arguments)

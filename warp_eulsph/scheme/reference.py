@@ -162,8 +162,6 @@ class Configuration:
         lists: neighbour lists, with the pair weights g_ab.
         poor: (n,) directions in which a particle's gradient fell back to zero; 0 is healthy.
         simd: whether sums over neighbours run by SIMD kernels.
-        rows: what the pass that makes weights reads of a neighbour, packed; who does the same between refreshes may
-            use its memory. Without any where that is done once.
     """
 
     def __init__(
@@ -193,7 +191,7 @@ class Configuration:
         self.lists = NeighbourLists(space, weight, self.fields.h, particles.group, box, device, tilted)
         self.K = self.fields.L if self.plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
-        self.rows = packed_rows(space, 0 if fixed or not self.simd else n, VECTORS, device)
+        self._packed: dict[int, wp.array] = {}
         self._largest = wp.zeros(1, dtype=space.real, device=device)
         self._interpolations: dict[Values, Interpolation] = {}
 
@@ -248,6 +246,7 @@ class Configuration:
     def _settle(self) -> None:
         if self.fixed:
             self.lists.release()
+            self._packed.clear()
             self._launch.forget()  # what was needed on the way, which would stay with its launches
 
     def _correct(self) -> None:
@@ -275,7 +274,7 @@ class Configuration:
     def _weigh(self, v: wp.array | None = None, sums: wp.array | None = None) -> None:
         n, fields, near, of_v = len(self.K), self.fields, self.near, sums is not None
         if self.sums_with_weights:
-            rows = self.rows if len(self.rows) else packed_rows(self.space, n, VECTORS, self.device)
+            rows = self.packed(VECTORS)
             self._launch(make_pack(self.space, of_v), n, [self.particles, fields, v if of_v else fields.x, rows])
             arguments = [fields, near, rows, self.K, sums if of_v else self.K]
             self._launch(make_pair_sums_simd(self.weight, self.space, of_v), n, arguments)
@@ -283,6 +282,17 @@ class Configuration:
             self._launch(make_pair_sums(self.weight, self.space), n, [self.particles, fields, near, self.K])
         for interpolation in self._interpolations.values():
             interpolation.refresh()
+
+    def packed(self, vectors: int) -> wp.array:
+        """Rows of ``vectors`` times four reals (``packed_rows``) for passes that take turns with their memory."""
+        if vectors not in self._packed:
+            most = max(self._packed, default=0)
+            if vectors > most:  # the others will be in its memory
+                self._packed.clear()
+                self._launch.forget()
+            within = self._packed.get(most)
+            self._packed[vectors] = packed_rows(self.space, len(self.K), vectors, self.device, within)
+        return self._packed[vectors]
 
     def interpolation(self, values: Values) -> Interpolation:
         """N with these corrected values; made at the first call, refreshed with the reference from then on."""

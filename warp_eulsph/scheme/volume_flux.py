@@ -221,7 +221,7 @@ class VolumeFlux:
         gradient = exact(self.grad_p)
         fields, near = configuration.fields, configuration.near
         if configuration.simd:
-            rows = configuration.rows
+            rows = configuration.packed(VECTORS)
             self._launch(_make_pack(self.space), n, [fields, sums.flux, self._p, gradient, rows])
             arguments = [near, rows, sums.epsilon, clock, self.change]
             self._launch(_make_exchange_simd(self.space), n, arguments)
