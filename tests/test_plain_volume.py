@@ -15,7 +15,6 @@ from warp_eulsph.validation.cases import metal_punch
 
 RUBBER = es.NeoHookean(density=1e3, young=1e6, poisson=0.4)
 SIDES = {1: 40, 2: 20, 3: 12}
-WENDLAND = {"weight": es.WendlandC2(), "dilation": 1.8}
 
 
 def block(dim, jitter=0.15, scheme=es.Verlet(correction=es.PlainVolume()), speed=1.0, **options):
@@ -132,6 +131,17 @@ def test_threads_keep_every_bit(monkeypatch):
 def test_resume_is_exact(scheme):
     options = {"reference": es.Every(3), "scheme": scheme(correction=es.PlainVolume())}
     resume_is_exact(lambda: block(2, **options), 5, 4)
+
+
+def test_nothing_is_done_where_the_arrangement_stays():
+    """With given surface vectors corrections are built there too."""
+    x, volume = box((0.0, 0.0), (1.0, 1.0), 0.05, jitter=0.2)
+    velocity = np.random.default_rng(2).normal(size=x.shape)
+    body = es.Body(x=x, volume=volume, material=RUBBER, velocity=velocity, surface=0.0)
+    simulation = es.Simulation(body, scheme=es.Verlet(correction=es.PlainVolume()))
+    simulation.step(3)
+    exact, moving, inside = gradients(simulation)
+    assert np.array_equal(moving, exact) and not inside.any()
 
 
 def test_liquids_have_their_own():

@@ -122,7 +122,9 @@ class PlainVolumeForces(UpwindForces):
         self._configuration: Configuration | None = None
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
-        """Look who is inside."""
+        """Look who is inside; where the arrangement does not move nobody crowds, and nothing is done."""
+        if configuration.fixed:
+            return
         if self._configuration is None:
             self._kappa.assign(lattice_kappa(configuration))
             self._configuration = configuration

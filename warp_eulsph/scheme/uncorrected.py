@@ -43,7 +43,7 @@ class Uncorrected(Correction):
         if not flux.forgets:
             raise ValueError(
                 "correction=Uncorrected() is for liquids and gases, whose F is J^(1/d) I, got a solid whose "
-                "arrangement is read anew; take Balance() there, or arrangement=Convected()"
+                "arrangement is read anew; take Balance() or PlainVolume() there, or arrangement=Convected()"
             )
         return UncorrectedForces(space, len(particles.mass), device)
 
