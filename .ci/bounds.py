@@ -1,17 +1,13 @@
 """Print the lower bounds of the package's dependencies and extras as constraints: ``name==version``, a line each."""
 
 import re
+import tomllib
 from pathlib import Path
-
-try:
-    import tomllib
-except ModuleNotFoundError:  # Python 3.10
-    import tomli as tomllib
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 OF_USERS = [requirement for extra in EXTRAS if extra not in ("all", "docs", "test") for requirement in EXTRAS[extra]]
 
 for requirement in [*PROJECT["dependencies"], *OF_USERS]:
-    name, version, marker = re.fullmatch(r"([\w-]+)>=([\w.]+)(?:; (.*))?", requirement).groups()
-    print(f"{name}=={version}" + (f"; {marker}" if marker else ""))
+    name, version = re.fullmatch(r"([\w-]+)>=([\w.]+)", requirement).groups()
+    print(f"{name}=={version}")

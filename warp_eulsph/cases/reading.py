@@ -2,7 +2,7 @@
 
 import copy
 import keyword
-import sys
+import tomllib
 import unicodedata
 from collections.abc import Sequence
 from os import PathLike
@@ -15,12 +15,6 @@ from .case import Case
 from .expressions import COORDINATES, FUNCTIONS, Expression, nearest, parse
 from .transport import TransportCase
 from .values import Reading, number
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 
 # What stands at the top of a case file: an override of one word that is not among these may be a parameter's
 ENTRIES = {*Case.model_fields, *TransportCase.model_fields}
