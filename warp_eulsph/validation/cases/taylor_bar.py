@@ -50,7 +50,7 @@ def outline(X: np.ndarray, x: np.ndarray, radius: float = RADIUS) -> np.ndarray:
     R, layer = np.hypot(X[:, 0], X[:, 1]), np.round(X[:, 2] / X[:, 2].min()).astype(int)
     found = []
     for number in np.unique(layer):
-        outer = (layer == number) & (R > OUTER * radius)
+        outer = (layer == number) & (OUTER * radius < R)
         line = np.stack([np.ones(outer.sum()), R[outer]], axis=-1)
         values = np.stack([np.hypot(x[outer, 0], x[outer, 1]), x[outer, 2]], axis=-1)
         found.append([1.0, radius] @ np.linalg.lstsq(line, values, rcond=None)[0])
