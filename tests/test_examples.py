@@ -120,6 +120,12 @@ def test_container(run):
     assert figures["momentum that is missing / start"] < 1e-12
 
 
+def test_elastic_gate(run):
+    figures, frames = run("elastic_gate", "-n", "2", "--until", "0.0436")
+    assert frames == 6
+    assert 12.9 < figures["way of the tip [mm]"] < 17.5  # measured; a tenth more than Antoci et al. computed
+
+
 def test_failed_check_ends_the_example(run):
     """Six particles along the block's side are too few for the reaction at 15 ms."""
     with pytest.raises(SystemExit, match=r"outside the accepted band: .*'reaction at 15 ms"):
@@ -138,6 +144,7 @@ def test_failed_check_ends_the_example(run):
         ("taylor_bar", (3, es.Current())),
         ("container", (20, 200.0)),
         ("container", (20, 200.0, 3)),
+        ("elastic_gate", (2,)),
     ],
 )
 def test_set_up_is_shown_and_is_the_one_that_is_validated(name, arguments, monkeypatch):

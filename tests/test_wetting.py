@@ -261,3 +261,18 @@ def test_nothing_leaks_through_two_particles():
     assert np.abs(simulation.v[own:]).max() > 10.0
     energy = simulation.energy()
     assert abs(energy["interaction"]) < 1e-12 * energy["total"] and abs(energy["residual"]) < 1e-12 * energy["total"]
+
+
+@pytest.mark.parametrize(("layers", "told"), [(3, True), (4, False)])
+def test_solids_thinner_than_the_liquid_reaches_are_told(layers, told, caplog):
+    """By the weight of liquids 3.6 spacings less half of one; what to do stands in the warning."""
+    x, volume = box((0.0, 0.0), (2.0, 0.4), 0.05)
+    pool = es.Body(x=x, volume=volume, material=WATER, spacing=0.05, name="water")
+    x, volume = box((0.0, -0.05 * layers), (2.0, 0.0), 0.05)
+    rubber = es.NeoHookean(density=1000.0, young=1e6, poisson=0.3)
+    plate = es.Body(x=x, volume=volume, material=rubber, spacing=0.05, name="plate")
+    es.Simulation([plate, pool], interactions=[es.Contact()])
+    lines = [record.getMessage() for record in caplog.records if "thick" in record.getMessage()]
+    assert len(lines) == told
+    if told:
+        assert "'plate' is some 0.14" in lines[0] and "'water' reaches 0.155 m" in lines[0]

@@ -195,12 +195,18 @@ def stretch_bounds(space: Space) -> wp.Function:
 
 @functools.cache
 def largest_shortening(space: Space) -> wp.Function:
-    """``wp.func`` bound of the largest squared principal stretch of A⁻¹, without the inverse."""
-    real, mat, share = space.real, space.mat, 1.0 / space.dim
+    """``wp.func`` bound of the largest squared principal stretch of A⁻¹, without the inverse.
+
+    Exact of multiples of I, such as those of liquids, whose spread would be the root of round-off.
+    """
+    real, mat, share, dim = space.real, space.mat, 1.0 / space.dim, space.dim
     determinant, cof, spread_of = det(space), cofactor(space), spread_of_invariants(space)
 
     @wp.func
     def largest_shortening(A: mat) -> real:
+        D = A - wp.identity(n=wp.static(dim), dtype=real) * A[0, 0]
+        if wp.ddot(D, D) == real(0.0):
+            return real(1.0) / (A[0, 0] * A[0, 0])
         # A⁻¹ = (cof A)ᵀ/J and cof A⁻¹ = Aᵀ/J
         C = cof(A)
         rate = real(1.0) / determinant(A)

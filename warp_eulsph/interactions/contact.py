@@ -20,6 +20,7 @@ from .law import make_give, make_push, make_raise, make_rate, skin_structure
 from .moved import Moved
 from .nearby import Nearby, matter_structure
 from .skin import Skin, flowing
+from .thinness import tell_thin
 from .wetting_solids import find_wettings
 
 if TYPE_CHECKING:
@@ -117,6 +118,7 @@ class BoundContact(BoundInteraction):
         self._passed = wp.zeros(1, dtype=wp.float64, device=world.device)
         self._wettings = find_wettings(world, self.assembly, self._felt)
         self.skin = Skin(world, self.assembly, self._names)
+        tell_thin(world, self.assembly, self.skin, self.touching, self._wettings)
         self.nearby = Nearby(self.skin, self._felt, self._matter(world))
         self._arrays = skin_structure(self.space)()
         for name in ("places", "there", "area", "half", "modulus", "shear_modulus", "normal", "bend"):

@@ -70,3 +70,16 @@ def make_gradient(space: Space, components: int, simd: bool = False) -> wp.Kerne
         out[a] = sums @ reference.L[a]
 
     return gradient
+
+
+@functools.cache
+def make_finish(space: Space) -> wp.Kernel:
+    """Kernel: ∇f_a, for f of ``vec``, from its sums, in place: times L_a (M4)."""
+    mat, Reference = space.mat, structure(space, "Reference")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def finish_gradient(first: int, reference: Reference, out: wp.array(dtype=mat)):
+        a = first + wp.tid()
+        out[a] = out[a] @ reference.L[a]
+
+    return finish_gradient

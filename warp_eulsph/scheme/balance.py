@@ -90,6 +90,8 @@ def _make_correct(space: Space, simd: bool) -> wp.Kernel:
 class BalancedPairs(UpwindForces):
     """M13 at work: it acts on the reference, and leaves no force of its own beside M9."""
 
+    balances = True
+
     def __init__(self, option: Balance, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
         super().__init__(space, device)
         self.option, self.particles = option, particles

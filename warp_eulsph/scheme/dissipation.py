@@ -159,7 +159,7 @@ class UpwindForces(Stabiliser):
 
     def __init__(self, space: Space, device: wp.DeviceLike):
         self.space, self.device, self._launch = space, device, Launcher(device)
-        self._in_one_pass: PairForces | None = None
+        self._in_one_pass = PairForces(space, device)
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare: M9 needs the lists only."""
@@ -168,13 +168,16 @@ class UpwindForces(Stabiliser):
         """The portable kernels do, the SIMD pass makes its own."""
         return not configuration.pairs_by_simd(sensed)
 
+    def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
+        """The SIMD pass can, along the pairs of M9."""
+        return not self.balances and not self.takes_dual(configuration, sensed)
+
     def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
         """Internal force (M5) and dissipation (M9)."""
         configuration, forces, sensed = sums.configuration, sums.forces, sums.sensor is not None
         if not self.takes_dual(configuration, sensed):
-            if self._in_one_pass is None:
-                self._in_one_pass = PairForces(self.space, len(v), self.device)
-            self._in_one_pass.compute(configuration, sums.flux, x, v, sums.grad_v, sums.epsilon, forces)
+            arguments = [configuration, sums.flux, x, v, sums.grad_v, sums.epsilon, forces, sums.grad_p]
+            self._in_one_pass.compute(*arguments)
             return
         configuration.divergence(sums.flux.Pi, forces.internal)
         arguments = [configuration.fields, configuration.near, sums.flux, x, v, sums.grad_v, sums.epsilon]

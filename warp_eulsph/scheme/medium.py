@@ -1,7 +1,7 @@
 """A medium: bodies that share the reference and the options of the scheme, and each line of a step on them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -78,9 +78,8 @@ class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
     Attributes:
-        surface_given: the bodies came with their area vectors.
+        surface_given: the bodies came with their area vectors. walls: what takes part in its sums from outside.
         stabiliser: of its reference. sharpener, pairs, limiter, shifter: None where the options have none.
-        walls: what takes part in its sums from outside.
         breaking, heating, volumes: None where no law fails, none takes heat, no volume flows between pairs.
         particles, forces, grad_v: of its own particles, views of what the world has.
         steady: its steps begin with the ∇_k v that the one before kept.
@@ -176,6 +175,8 @@ class Medium:
         if self.exchanges:
             self.flux.keep_dissipated()
             self.volumes = VolumeFlux(self.space, self.flux, self.particles, own, self.device)
+            if self.stabiliser.sums_pressure(self.configuration, self.sums.sensor is not None):
+                self.sums = replace(self.sums, grad_p=self.volumes.grad_p)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -215,9 +216,15 @@ class Medium:
         self.configuration.move(self.of(state))
 
     def renew(self, state: StateArrays) -> None:
-        """Neighbours and corrections of the new reference (M3), and what the options add."""
-        self.configuration.renew()
+        """Neighbours and corrections of the new reference (M3), what the options add, ∇_k v where it is kept."""
+        early = self.steady and not self.stabiliser.balances and self.configuration.sums_with_weights
+        self.configuration.renew(self.of(state).v, self.kept if early else None)
         self.stabilise(state)
+        if early:
+            self.configuration.finish_gradient(self.kept)
+            self.walls.add_gradient(self.of(state).v, self.kept)
+        else:
+            self.keep_gradient(state)
 
     def stabilise(self, state: StateArrays) -> None:
         """Prepare the stabiliser for a new reference, and what else depends on it."""

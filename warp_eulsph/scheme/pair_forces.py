@@ -1,4 +1,4 @@
-"""Internal force (M5) and dissipation (M9) in one SIMD pass over the neighbours, on the CPU."""
+"""Internal force (M5) and dissipation (M9) in one SIMD pass over the neighbours, on the CPU, and ∇p for M24."""
 
 import functools
 
@@ -6,7 +6,7 @@ import warp as wp
 
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
-from ..simd import BY_EIGHT, OWN_ROW, packed_rows, prelude
+from ..simd import BY_EIGHT, OWN_ROW, prelude
 from ..space import Space
 from ..structs import FluxArrays, ForceArrays
 from .reference import Configuration
@@ -26,15 +26,27 @@ SQUARES = """
 
 
 def _vectors(space: Space) -> int:
-    """Rows of four: x_k with the impedance, v with the shear impedance, x, columns of −½∇v, columns of Π with x̂."""
+    """Rows of four: x_k with the impedance, v with the shear impedance, x with p, columns of −½∇v, of Π with x̂."""
     return 3 + 2 * space.dim
+
+
+@functools.cache
+def pressure_of(space: Space) -> wp.Function:
+    """``wp.func`` p of the stress Q in the reference."""
+    real, mat, dim = space.real, space.mat, float(space.dim)
+
+    @wp.func
+    def pressure_of(Q: mat) -> real:
+        return -wp.trace(Q) / real(dim)
+
+    return pressure_of
 
 
 @functools.cache
 def _make_pack(space: Space) -> wp.Kernel:
     """Kernel: what the pass reads of a neighbour, side by side; Π = Q Lᵀ (M5) is made here."""
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
-    Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
+    Reference, Flux, pressure = structure(space, "Reference"), structure(space, "Flux"), pressure_of(space)
     first_grad, first_Pi = 12, 12 + 4 * dim
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -52,10 +64,12 @@ def _make_pack(space: Space) -> wp.Kernel:
         Pi_a = flux.Q[a] @ wp.transpose(reference.L[a])
         rows[a, 3] = flux.impedance[a]
         rows[a, 7] = flux.shear_impedance[a]
+        rows[a, 11] = pressure(flux.Q[a])
         for i in range(wp.static(dim)):
             rows[a, i] = x_a[i]
             rows[a, 4 + i] = v_a[i]
             rows[a, 8 + i] = now_a[i]
+            rows[a, first_grad + 4 * i + 3] = real(0.0)  # is added to the shear impedance
             rows[a, first_Pi + 4 * i + 3] = balanced_a[i]
             for j in range(wp.static(dim)):
                 rows[a, first_grad + 4 * j + i] = grad_a[i, j] * real(-0.5)
@@ -65,9 +79,9 @@ def _make_pack(space: Space) -> wp.Kernel:
 
 
 @functools.cache
-def _make_forces(space: Space) -> wp.Kernel:
-    """Kernel: M5 and M9 from packed rows."""
-    real, vec = space.real, space.vec
+def _make_forces(space: Space, pressure: bool) -> wp.Kernel:
+    """Kernel: M5 and M9 from packed rows; with ``pressure`` ∇_k p (M4) too, where no positions are balanced."""
+    real, vec, rows_of_p = space.real, space.vec, space.row_gradient(1)
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     snippet = f"""
     {prelude(space)}
@@ -76,12 +90,12 @@ def _make_forces(space: Space) -> wp.Kernel:
     {OWN_ROW}
     // impedances are added where the rest is subtracted
     const V x_a = mine(0, -1), v_a = mine(1, -1), now_a = mine(2, 1);
-    V grad_a[dim], Pi_a[dim], internal = 0, dissipation[dim];
+    V grad_a[dim], Pi_a[dim], internal = 0, dissipation[dim], slope[dim];
     #pragma unroll
     for (int j = 0; j < dim; ++j) {{
         grad_a[j] = mine(3 + j, 1);
         Pi_a[j] = mine(3 + dim + j, -1);
-        dissipation[j] = 0;
+        dissipation[j] = slope[j] = 0;
     }}
     auto eight = [&](const int* b, V w) __attribute__((always_inline)) {{
         V xi[4], now[4], jump[4], X[4], N[4], J[4];
@@ -103,6 +117,11 @@ def _make_forces(space: Space) -> wp.Kernel:
         const V normal = along * (Z - Z_shear) * (wr / nn), shear = Z_shear * wr;
         #pragma unroll
         for (int j = 0; j < dim; ++j) dissipation[j] += N[j] * normal + J[j] * shear;
+        if ({int(pressure)}) {{
+            const V jump_of_p = N[3] * w;
+            #pragma unroll
+            for (int j = 0; j < dim; ++j) slope[j] += X[j] * jump_of_p;
+        }}
         // apart, so that few vectors are alive at a time and few are spilled
         #pragma unroll
         for (int i = 0; i < 4; ++i) {{
@@ -120,7 +139,10 @@ def _make_forces(space: Space) -> wp.Kernel:
     {BY_EIGHT}
     internals.data[a] = store(fold(internal) * V_a);
     #pragma unroll
-    for (int j = 0; j < dim; ++j) dissipations.data[a].c[j] = total(dissipation[j]) * (V_a * epsilon * T(0.25));
+    for (int j = 0; j < dim; ++j) {{
+        dissipations.data[a].c[j] = total(dissipation[j]) * (V_a * epsilon * T(0.25));
+        if ({int(pressure)}) slopes.data[a].data[0][j] = total(slope[j]);
+    }}
     """
 
     @wp.func_native(snippet)
@@ -136,6 +158,7 @@ def _make_forces(space: Space) -> wp.Kernel:
         V_a: real,
         internals: wp.array(dtype=vec),
         dissipations: wp.array(dtype=vec),
+        slopes: wp.array(dtype=rows_of_p),
     ): ...
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -147,20 +170,24 @@ def _make_forces(space: Space) -> wp.Kernel:
         epsilon: real,
         internal: wp.array(dtype=vec),
         dissipation: wp.array(dtype=vec),
+        grad_p: wp.array(dtype=rows_of_p),
     ):
         a = first + wp.tid()
-        begin, end = near.start[a], near.start[a + 1]
-        sum_forces(a, begin, end, near.index, near.w, near.box, rows, epsilon, reference.V[a], internal, dissipation)
+        begin, end, V_a = near.start[a], near.start[a + 1], reference.V[a]
+        w, box = near.w, near.box
+        sum_forces(a, begin, end, near.index, w, box, rows, epsilon, V_a, internal, dissipation, grad_p)
+        if wp.static(pressure):
+            grad_p[a] = grad_p[a] @ reference.L[a]
 
     return pair_forces
 
 
 class PairForces:
-    """The pass at work on n particles."""
+    """The pass at work."""
 
-    def __init__(self, space: Space, n: int, device: wp.DeviceLike):
+    def __init__(self, space: Space, device: wp.DeviceLike):
         self.space, self._launch = space, Launcher(device)
-        self._rows = packed_rows(space, n, _vectors(space), device)
+        self._no_p = wp.zeros(0, dtype=space.row_gradient(1), device=device)
 
     def compute(
         self,
@@ -171,9 +198,11 @@ class PairForces:
         grad_v: wp.array,
         epsilon: float,
         forces: ForceArrays,
+        grad_p: wp.array | None,
     ) -> None:
-        """``forces.internal`` (M5) and ``forces.dissipation`` (M9 without a sensor) [N]."""
-        n = len(v)
-        self._launch(_make_pack(self.space), n, [configuration.fields, flux, x, v, grad_v, self._rows])
-        arguments = [configuration.fields, configuration.near, self._rows, epsilon]
-        self._launch(_make_forces(self.space), n, [*arguments, forces.internal, forces.dissipation])
+        """``forces.internal`` (M5) and ``forces.dissipation`` (M9 without a sensor) [N], and ``grad_p`` if given."""
+        n, rows = len(v), configuration.packed(_vectors(self.space))
+        self._launch(_make_pack(self.space), n, [configuration.fields, flux, x, v, grad_v, rows])
+        arguments = [configuration.fields, configuration.near, rows, epsilon]
+        arguments += [forces.internal, forces.dissipation, self._no_p if grad_p is None else grad_p]
+        self._launch(_make_forces(self.space, grad_p is not None), n, arguments)

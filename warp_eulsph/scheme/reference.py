@@ -10,12 +10,13 @@ from ..atomics import raise_to
 from ..execution import Launcher, launch, simd
 from ..fields import allocate, arrays, neighbour_structure, structure
 from ..linalg import det, inverse, largest_shortening, stretch_bounds, stretch_of_volume, symmetric_bounds
-from ..operators.correction import make_correct, make_pair_sums, make_pair_sums_simd
+from ..operators.correction import VECTORS, make_correct, make_pack, make_pair_sums, make_pair_sums_simd
 from ..operators.divergence import make_divergence, make_tilted_divergence
-from ..operators.gradient import make_gradient
+from ..operators.gradient import make_finish, make_gradient
 from ..operators.interpolation import Interpolation
 from ..operators.neighbours import NeighbourLists
 from ..operators.values import Values
+from ..simd import packed_rows
 from ..space import Space, difference
 from ..structs import NeighbourRows, ParticleArrays, ReferenceArrays, StateArrays
 from ..weights import Weight
@@ -190,6 +191,7 @@ class Configuration:
         self.lists = NeighbourLists(space, weight, self.fields.h, particles.group, box, device, tilted)
         self.K = self.fields.L if self.plain else wp.zeros(n, dtype=space.mat, device=device)
         self.poor = wp.zeros(n, dtype=wp.int32, device=device)
+        self._packed: dict[int, wp.array] = {}
         self._largest = wp.zeros(1, dtype=space.real, device=device)
         self._interpolations: dict[Values, Interpolation] = {}
 
@@ -211,17 +213,21 @@ class Configuration:
         self._launch(_make_adopt(self.space, self.fixed), len(self.K), [state, self.particles, self.fields])
         self.lists.count_neighbours(self.fields.x)
 
-    def renew(self) -> None:
-        """Last part of a refresh, launches only: the neighbours, pair weights and corrections (M3)."""
+    def renew(self, v: wp.array | None = None, sums: wp.array | None = None) -> None:
+        """Last part of a refresh, launches only: the neighbours, pair weights and corrections (M3).
+
+        And the ``sums`` of ∇_k v, (n,) of mat, instead of those of masses (M7), if given, where ``sums_with_weights``;
+        ``finish_gradient`` does the rest.
+        """
         self.lists.fill(self.fields.x)
-        self._weigh()
+        self._weigh(v, sums)
         self._correct()
         self._settle()
 
     def evolving(self) -> dict[str, wp.array]:
         """The reference's arrays by name: what a checkpoint must hold; ``rebuild`` derives the rest from them."""
         held = arrays(self.fields, "Reference")
-        for derived in ("resolution", "moment"):
+        for derived in ("resolution", "moment", "row"):
             held.pop(f"Reference.{derived}")
         if self.fixed:
             held.pop("Reference.F")
@@ -240,6 +246,7 @@ class Configuration:
     def _settle(self) -> None:
         if self.fixed:
             self.lists.release()
+            self._packed.clear()
             self._launch.forget()  # what was needed on the way, which would stay with its launches
 
     def _correct(self) -> None:
@@ -259,12 +266,33 @@ class Configuration:
         if self.fixed and self.tilt is None:
             self._launch(_make_resolve(self.space), len(self.K), [self.particles, self.fields, self._steeper])
 
-    def _weigh(self) -> None:
-        by_simd = self.simd and self.weight.slope_cpp is not None
-        make = make_pair_sums_simd if by_simd else make_pair_sums
-        self._launch(make(self.weight, self.space), len(self.K), [self.particles, self.fields, self.near, self.K])
+    @property
+    def sums_with_weights(self) -> bool:
+        """Whether ``renew`` can sum a gradient in the pass that makes weights."""
+        return self.simd and self.weight.slope_cpp is not None
+
+    def _weigh(self, v: wp.array | None = None, sums: wp.array | None = None) -> None:
+        n, fields, near, of_v = len(self.K), self.fields, self.near, sums is not None
+        if self.sums_with_weights:
+            rows = self.packed(VECTORS)
+            self._launch(make_pack(self.space, of_v), n, [self.particles, fields, v if of_v else fields.x, rows])
+            arguments = [fields, near, rows, self.K, sums if of_v else self.K]
+            self._launch(make_pair_sums_simd(self.weight, self.space, of_v), n, arguments)
+        else:
+            self._launch(make_pair_sums(self.weight, self.space), n, [self.particles, fields, near, self.K])
         for interpolation in self._interpolations.values():
             interpolation.refresh()
+
+    def packed(self, vectors: int) -> wp.array:
+        """Rows of ``vectors`` times four reals (``packed_rows``) for passes that take turns with their memory."""
+        if vectors not in self._packed:
+            most = max(self._packed, default=0)
+            if vectors > most:  # the others will be in its memory
+                self._packed.clear()
+                self._launch.forget()
+            within = self._packed.get(most)
+            self._packed[vectors] = packed_rows(self.space, len(self.K), vectors, self.device, within)
+        return self._packed[vectors]
 
     def interpolation(self, values: Values) -> Interpolation:
         """N with these corrected values; made at the first call, refreshed with the reference from then on."""
@@ -278,6 +306,10 @@ class Configuration:
         """``out`` ← ∇_k f, the corrected gradient (M4) of rows ``f`` of c reals, (n,) of c × dim reals."""
         kernel = make_gradient(self.space, wp.types.type_size(f.dtype), self.simd)
         self._launch(kernel, len(f), [self.fields, self.near, f, out])
+
+    def finish_gradient(self, out: wp.array) -> None:
+        """∇_k of a field of ``vec`` in place of its sums (``renew``), by L as it is, (n,) of mat."""
+        self._launch(make_finish(self.space), len(out), [self.fields, out])
 
     def divergence(self, Pi: wp.array, out: wp.array) -> None:
         """``out`` ← −T, the dual divergence (M5) of Π = Q Lᵀ, (n,) of vec.

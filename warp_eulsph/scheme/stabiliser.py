@@ -37,6 +37,7 @@ class Sums:
         forces: written.
         epsilon: share of the upwind flux (M9), 0 where nothing dissipates.
         sensor: (n,) of vec in [0, 1] that switches M9 to first order; None without.
+        grad_p: ∇_k p (M4), written too; None where nobody asks (``Stabiliser.sums_pressure``).
     """
 
     configuration: Configuration
@@ -45,6 +46,7 @@ class Sums:
     forces: ForceArrays
     epsilon: float = 0.0
     sensor: wp.array | None = None
+    grad_p: wp.array | None = None
 
 
 class Stabiliser(ABC):
@@ -52,6 +54,8 @@ class Stabiliser(ABC):
 
     #: Whether ``compute`` writes ``forces.correction``, which is zero otherwise and takes no memory.
     corrects: ClassVar[bool] = True
+    #: Whether gradients join balanced positions (M13), and not those of the particles.
+    balances: ClassVar[bool] = False
     #: Whether walls take part in the sums (M28).
     takes_walls: ClassVar[bool] = False
     #: Of corrections that have them (``Correction.has_potentials``).
@@ -66,6 +70,10 @@ class Stabiliser(ABC):
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
         """Whether ``compute``, with a sensor or without, takes Π from the array of the flux (M5)."""
         return True
+
+    def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
+        """Whether ``compute`` can sum ∇_k p with the forces, for M24."""
+        return False
 
     def exact(self, gradient: wp.array) -> wp.array:
         """Gradients that are exact for linear fields from those of the reference, by which M9 and M24 reconstruct."""

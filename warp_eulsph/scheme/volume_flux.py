@@ -5,29 +5,28 @@ from collections.abc import Callable
 
 import warp as wp
 
-from ..execution import Launcher, simd
+from ..execution import Launcher
 from ..fields import clock_structure, neighbour_structure, structure
 from ..materials import Law
 from ..materials.base import history_row, long_form
-from ..simd import BY_EIGHT, OWN_ROW, packed_rows, prelude
+from ..operators.correction import VECTORS
+from ..simd import BY_EIGHT, OWN_ROW, prelude
 from ..space import Space, difference
 from ..structs import ClockArrays, ParticleArrays
 from .flux import Flux
+from .pair_forces import pressure_of
 from .stabiliser import Sums
-
-# Rows of four that the SIMD pass reads of a neighbour.
-VECTORS = 2
 
 
 @functools.cache
 def _make_pressure(space: Space) -> wp.Kernel:
     """Kernel: p of the stress in the reference."""
-    real, row, Flux, dim = space.real, space.row(1), structure(space, "Flux"), float(space.dim)
+    row, Flux, of_stress = space.row(1), structure(space, "Flux"), pressure_of(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def pressure(first: int, flux: Flux, out: wp.array(dtype=row)):
         a = first + wp.tid()
-        out[a] = row(-wp.trace(flux.Q[a]) / real(dim))
+        out[a] = row(of_stress(flux.Q[a]))
 
     return pressure
 
@@ -201,25 +200,30 @@ def _make_take(space: Space, law: Law) -> wp.Kernel:
 
 
 class VolumeFlux:
-    """M24 at work on one medium of fluids."""
+    """M24 at work on one medium of fluids.
+
+    Attributes:
+        grad_p: ∇_k p (M4), (n,) of one row of dim reals; those who sum forces may have left it.
+    """
 
     def __init__(self, space: Space, flux: Flux, particles: ParticleArrays, change: wp.array, device: wp.DeviceLike):
         self.space, self.flux, self.particles, self.change = space, flux, particles, change
         self._launch, n = Launcher(device), len(change)
         self._p = wp.zeros(n, dtype=space.row(1), device=device)
-        self._grad_p = wp.zeros(n, dtype=space.row_gradient(1), device=device)
-        self._rows = packed_rows(space, n if simd(device) else 0, VECTORS, device)
+        self.grad_p = wp.zeros(n, dtype=space.row_gradient(1), device=device)
 
     def find(self, sums: Sums, exact: Callable[[wp.array], wp.array], clock: ClockArrays) -> None:
         """ΔV/V of the step, by the pressures that it was made with."""
         configuration, n = sums.configuration, len(self.change)
         self._launch(_make_pressure(self.space), n, [sums.flux, self._p])
-        configuration.gradient(self._p, self._grad_p)
-        gradient = exact(self._grad_p)
+        if sums.grad_p is None:
+            configuration.gradient(self._p, self.grad_p)
+        gradient = exact(self.grad_p)
         fields, near = configuration.fields, configuration.near
         if configuration.simd:
-            self._launch(_make_pack(self.space), n, [fields, sums.flux, self._p, gradient, self._rows])
-            arguments = [near, self._rows, sums.epsilon, clock, self.change]
+            rows = configuration.packed(VECTORS)
+            self._launch(_make_pack(self.space), n, [fields, sums.flux, self._p, gradient, rows])
+            arguments = [near, rows, sums.epsilon, clock, self.change]
             self._launch(_make_exchange_simd(self.space), n, arguments)
             return
         arguments = [fields, near, sums.flux, self._p, gradient, sums.epsilon, clock, self.change]

@@ -193,7 +193,6 @@ class World:
         """Last part of a refresh, launches only, when the lists have room: neighbours, corrections, balance."""
         for k in due:
             self.media[k].renew(self.U)
-            self.media[k].keep_gradient(self.U)
 
     def _shift(self, U: StateArrays, due: Sequence[int] | None = None) -> None:
         shifted = [m for k, m in enumerate(self.media) if m.shifter is not None and (due is None or k in due)]
