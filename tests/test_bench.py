@@ -190,13 +190,16 @@ def test_runs_beside_the_first_release_still_have_their_error(monkeypatch, capsy
 @pytest.mark.of_the_cpu
 def test_kernels_of_a_step_are_timed(monkeypatch):
     """A total Lagrangian step makes five sums over neighbours; their times and those of the rest make up the step's."""
-    monkeypatch.setattr(passes, "SECONDS_PER_ROUND", 0.05)
+    monkeypatch.setattr(passes, "SECONDS", 0.05)
     case = next(case for case in CASES if case.name == "total-2d-float64")
     threads = execution.threads()
     try:
-        lines = passes.table(dataclasses.replace(case, side=40), rounds=2).splitlines()
+        small = dataclasses.replace(case, side=40)
+        first, again = passes.tables([small, small], rounds=2)
     finally:
         execution.set_threads(threads)
+    lines = first.splitlines()
+    assert "%" not in lines[0] and again.splitlines()[0].split()[8] == "%,"
     sums = {line.split()[0] for line in lines if line.endswith("per pair")}
     assert len(sums) == 5 and "sharpening.sharpen" in sums and "updates.kick" not in sums
     listed = [float(line.split()[1]) for line in lines[1:]]

@@ -12,7 +12,7 @@ from warp_eulsph import execution, simulation, sorting, transport
 from warp_eulsph.defaults import COMMON, LIQUID
 from warp_eulsph.geometry import surface
 from warp_eulsph.output import checkpoint
-from warp_eulsph.scheme import exposure, flux, lax, time_step
+from warp_eulsph.scheme import exposure, flux_kernels, lax, time_step
 
 DOCS = Path(__file__).parents[1] / "docs"
 WORDS = {2: "two", 3: "three", Fraction(1, 2): "½", Fraction(1, 10): "a tenth", 100: "a hundred"}
@@ -31,7 +31,7 @@ FIGURES = [
     ("method.md", f"**Default: cubic spline, dilation {COMMON.dilation:g}**"),
     ("howto/fluids.md", f"`{LIQUID.weight!r}`, {LIQUID.dilation:g} |"),
     ("method.md", f"**Default: CFL {es.Verlet.cfl:g} for Verlet, {es.LaxWendroff.cfl:g} for the others.**"),
-    ("method.md", f"|∇v| Δt is at most CFL/{1.0 / flux.STRAIN:g}"),
+    ("method.md", f"|∇v| Δt is at most CFL/{1.0 / flux_kernels.STRAIN:g}"),
     ("method.md", f"**Default: ε = {es.Verlet().dissipation.epsilon:g}, no sensor.**"),
     ("method.md", f"**Default: χ = {word(es.Verlet().tie.stiffness)}**"),
     ("method.md", f"**Default: s = {es.Verlet().tilt.most:g}**"),
@@ -66,4 +66,4 @@ def test_figures_that_the_pages_have_once_for_several():
     assert es.Verlet() == COMMON.scheme
     text = inspect.getdoc(time_step.TimeStep)
     assert f"{es.Verlet.cfl:g} for Verlet and {es.LaxWendroff.cfl:g} for the others" in text
-    assert f"CFL/{1.0 / flux.STRAIN:g}" in text
+    assert f"CFL/{1.0 / flux_kernels.STRAIN:g}" in text

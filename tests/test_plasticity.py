@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from warp_eulsph.materials import JohnsonCook, LinearHardening, Tabulated, Voce
-from warp_eulsph.materials.log_strain import deviatoric_logarithm, exponential
+from warp_eulsph.materials.log_strain import strain_functions
 from warp_eulsph.space import Space, matrix_type
 
 
@@ -190,25 +190,42 @@ def test_float32_follows():
 
 
 @pytest.mark.parametrize("real", [wp.float32, wp.float64])
-def test_logarithm_and_exponential(real):
-    """Of strains from 1e-6 to 1, by the series and beyond it: to round-off."""
+def test_logarithm_and_powers(real):
+    """Of strains from 1e-6 to 1, by both series and beyond them: to round-off."""
     mat, eps = matrix_type(3, 3, real), np.finfo(Space(3, real).numpy).eps
-    logarithm, exp = deviatoric_logarithm(real), exponential(real)
+    deviator, logarithm, size, power = strain_functions(real)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def both(b: wp.array(dtype=mat), e: wp.array(dtype=mat), back: wp.array(dtype=mat)):
+    def all_of(
+        b: wp.array(dtype=mat),
+        e: wp.array(dtype=mat),
+        norm: wp.array(dtype=real),
+        root: wp.array(dtype=mat),
+        inverse: wp.array(dtype=mat),
+    ):
         i = wp.tid()
-        e[i] = logarithm(b[i])
-        back[i] = exp(e[i])
+        X = deviator(b[i], wp.identity(n=3, dtype=real))
+        e[i] = logarithm(X)
+        norm[i] = size(X)
+        root[i] = power(X, real(0.5))
+        inverse[i] = power(X, real(-1.7))
 
     S = np.random.default_rng(4).normal(size=(80, 3, 3))
     S = (S + S.swapaxes(1, 2)) / np.linalg.norm(S, axis=(1, 2))[:, None, None] * np.logspace(-6, 0, 80)[:, None, None]
-    b = wp.array(np.array([expm(s) for s in S]).astype(Space(3, real).numpy), dtype=mat)
-    e, back = wp.zeros_like(b), wp.zeros_like(b)
-    wp.launch(both, len(S), [b, e, back])
-    deviator = S - np.trace(S, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
-    np.testing.assert_allclose(e.numpy(), deviator, atol=40 * eps)
-    np.testing.assert_allclose(back.numpy(), [expm(d) for d in deviator], atol=80 * eps)
+    given = np.array([expm(s) for s in S]).astype(Space(3, real).numpy)
+    b = wp.array(given, dtype=mat)
+    e, root, inverse = (wp.zeros_like(b) for _ in range(3))
+    norm = wp.zeros(len(S), dtype=real)
+    wp.launch(all_of, len(S), [b, e, norm, root, inverse])
+    deviator_of = S - np.trace(S, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+    np.testing.assert_allclose(e.numpy(), deviator_of, atol=40 * eps)
+    np.testing.assert_allclose(norm.numpy(), np.linalg.norm(deviator_of, axis=(1, 2)), atol=40 * eps)
+    given = given.astype(float)
+    of_X = 3.0 * given / np.trace(given, axis1=1, axis2=2)[:, None, None]
+    for found, p in ((root, 0.5), (inverse, -1.7)):
+        exact = np.array([of_symmetric(lambda value, p=p: value**p, m) for m in of_X])
+        scale = np.linalg.norm(exact, axis=(1, 2))[:, None, None]
+        np.testing.assert_allclose(found.numpy() / scale, exact / scale, atol=40 * eps)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,8 @@ STEPS_PER_REFRESH = 10  # of the mode every_k
 MODES: dict[str, ReferencePolicy] = {"total": Never(), "every_k": Every(STEPS_PER_REFRESH), "eulerian": Always()}
 #: Of the stiffness of the rubber, yielding all over once it moves: what plasticity costs.
 METAL = J2(density=1100.0, young=17e6, poisson=0.45, hardening=LinearHardening(yield_stress=1e4, modulus=1e5))
+#: Stiffer and stronger, so that strains are those of metals, and does not yield.
+HARD_METAL = J2(density=1100.0, young=17e9, poisson=0.45, hardening=LinearHardening(yield_stress=1e9))
 #: With free surfaces, by the defaults of liquids.
 WATER = TaitLiquid(density=1000.0, sound_speed=100.0)
 DTYPES = {"float32": wp.float32, "float64": wp.float64}
@@ -79,6 +81,9 @@ def _all() -> Iterator[BenchCase]:
         for dtype in DTYPES:
             yield BenchCase(f"{mode}-3d-{dtype}-2-threads", 3, dtype, mode, 37, threads=2)
             yield BenchCase(f"{mode}-3d-{dtype}-yielding", 3, dtype, mode, 37, material=METAL)
+        if mode == "total":
+            for dtype in DTYPES:
+                yield BenchCase(f"{mode}-3d-{dtype}-unyielding", 3, dtype, mode, 37, material=HARD_METAL)
         for size, side in (("10k", 22), ("100k", 46), ("400k", 74), ("1M", 100)):
             yield BenchCase(f"{mode}-3d-float64-{size}", 3, "float64", mode, side)
         for order in ("shuffled", "sorted"):

@@ -15,8 +15,8 @@ FLAT = 1.0e-3
 # Part of the sum of half widths below which the pressure goes on along its tangent: it stays finite where bodies were
 # shot into each other.
 PRESSED = 0.25
-# Share of a gap that may close in a step, over the Courant number: that of ``STRAIN`` in ``scheme/flux.py``, for half
-# cells are matter too.
+# Share of a gap that may close in a step, over the Courant number: that of ``STRAIN`` in ``scheme/flux_kernels.py``,
+# for half cells are matter too.
 CLOSING = 0.25
 
 

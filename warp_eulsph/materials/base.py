@@ -41,6 +41,25 @@ class Variable(NamedTuple):
         return self.start if isinstance(self.start, tuple) else (self.start,)
 
 
+class Eights(NamedTuple):
+    """A law for ``count`` particles, eight or fewer, at once: on the CPU, where that is faster.
+
+    Functions, ``wp.func``, of (F, history, first, own, count, …), arrays with the particles' F from ``first`` and their
+    histories from ``own`` on; equal to those of the law up to round-off.
+
+    Attributes:
+        stress: (…, Δt, constants, P): P from ``first`` on.
+        energy: (…, constants, Ψ): Ψ [J/m^d] from ``first`` on, in float64.
+        wave_moduli: (…, constants) -> (2, 8): M and μ of each.
+        update: (…, Δt, constants, lost): histories, and the energy dissipated per initial volume from ``first`` on.
+    """
+
+    stress: wp.Function
+    energy: wp.Function
+    wave_moduli: wp.Function
+    update: wp.Function
+
+
 class Law(NamedTuple):
     """The point functions of a material in one space, all ``wp.func``.
 
@@ -62,6 +81,7 @@ class Law(NamedTuple):
             arrangement stays, those that open (J > 1) lose their neighbours. None never fails.
         history: the variables that the law remembers, in this order one row of reals per particle; the same in every
             dimension.
+        eights: stress, energy and update of eight particles at once; None has each by itself.
 
     A law with a history has the long form, in which l = Ḟ F⁻¹ [1/s] is the velocity gradient and h the row:
 
@@ -94,6 +114,7 @@ class Law(NamedTuple):
     secant: wp.Function | None = None
     failed: wp.Function | None = None
     history: tuple[Variable, ...] = ()
+    eights: Eights | None = None
 
     @property
     def start(self) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import warp as wp
 
 from ..linalg import det, inverse
-from ..space import Space, matrix_type
+from ..space import Space
 from .base import Isotropic, Law, Variable, history_row, lame_constants
 from .hardening import not_negative
 from .j2 import STRAIN, WORK
@@ -92,7 +92,7 @@ class DruckerPrager(Isotropic):
 @functools.cache
 def _law(space: Space) -> Law:
     real, mat, pair, four = space.real, space.mat, space.row(2), space.row(4)
-    full, determinant, invert = matrix_type(3, 3, real), det(space), inverse(space)
+    determinant, invert = det(space), inverse(space)
 
     @wp.struct
     class Constants:
@@ -105,7 +105,7 @@ def _law(space: Space) -> Law:
 
     law = Law(Constants, None, None, None, history=HISTORY)
     row = history_row(space, law)
-    trial, _, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
+    trial, size, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
 
     @wp.func
     def elastic_volume(F: mat, h: row) -> real:
@@ -140,13 +140,13 @@ def _law(space: Space) -> Law:
         return four(onto[0], onto[1], closed, opened)
 
     @wp.func
-    def mises(e: full, c: Constants) -> real:
-        return wp.sqrt(real(6.0) * wp.ddot(e, e)) * c.mu
+    def mises(size: real, c: Constants) -> real:
+        return wp.sqrt(real(6.0)) * c.mu * size
 
     @wp.func
     def stress(F: mat, rate: mat, h: row, dt: real, c: Constants) -> mat:
         e = trial(F, h)
-        q, t = mises(e, c), c.kappa * elastic_volume(F, h)
+        q, t = mises(wp.sqrt(wp.ddot(e, e)), c), c.kappa * elastic_volume(F, h)
         share = real(1.0)
         if dt > real(0.0):
             onto = returned(q, t, h[9], c)
@@ -158,8 +158,8 @@ def _law(space: Space) -> Law:
 
     @wp.func
     def energy(F: mat, h: row, c: Constants) -> real:
-        e, volumetric = trial(F, h), elastic_volume(F, h)
-        return real(0.5) * c.kappa * volumetric * volumetric + c.mu * wp.ddot(e, e)
+        e, volumetric = size(F, h), elastic_volume(F, h)
+        return real(0.5) * c.kappa * volumetric * volumetric + c.mu * e * e
 
     @wp.func
     def wave_moduli(F: mat, h: row, c: Constants) -> pair:
@@ -167,8 +167,7 @@ def _law(space: Space) -> Law:
 
     @wp.func
     def update(F: mat, rate: mat, h: row, dt: real, c: Constants):
-        e = trial(F, h)
-        q, t = mises(e, c), c.kappa * elastic_volume(F, h)
+        q, t = mises(size(F, h), c), c.kappa * elastic_volume(F, h)
         onto = returned(q, t, h[9], c)
         if onto[0] >= q and onto[1] == t:
             return F, h, real(0.0)
@@ -176,7 +175,7 @@ def _law(space: Space) -> Law:
         alpha = real(0.0)
         if onto[0] < q:
             alpha = (q - onto[0]) / (real(3.0) * c.mu)
-            out = flowed(F, h, e * (onto[0] / q))
+            out = flowed(F, h, onto[0] / q)
             out[6] = h[6] + alpha
             bears = wp.max(c.k - c.A * onto[1], real(0.0))
             out[10] = wp.min(h[10], bears / (bears + real(3.0) * c.mu * out[6]))

@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 
 import warp as wp
 
-from ..linalg import det, inverse
+from ..linalg import cofactor, det
 from ..space import Space, matrix_type
-from .base import Isotropic, Law, Variable, history_row, lame_constants
+from .base import Eights, Isotropic, Law, Variable, history_row, lame_constants
 from .hardening import Hardening
-from .plastic_metric import METRIC, elastic_kinematics
+from .in_eights import EIGHT, plastic_eights
+from .plastic_metric import METRIC, elastic_kinematics, moduli_of_size
 
 STRAIN = Variable("plastic_strain", "-", "equivalent plastic strain", least=0.0)
 WORK = Variable("plastic_work", "J/m^3", "plastic work per initial volume", least=0.0)
@@ -98,15 +99,14 @@ def _return_mapping(real: type, Constants: Any, yield_stress: wp.Function) -> wp
 @functools.cache
 def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int], ...], history: Any) -> Law:
     dim, real, mat, pair = space.dim, space.real, space.mat, space.row(2)
-    full = matrix_type(3, 3, real)
     annotations = {name: real if size == 1 else space.row(size) for name, size in sizes}
     Constants = wp.struct(type("Constants", (), {"__annotations__": annotations, "__module__": __name__}))
     yield_stress = hardening.make_yield_stress(real, Constants)
     increment, shortened = _return_mapping(real, Constants, yield_stress), math.sqrt(1.5)
-    determinant, invert, heats = det(space), inverse(space), hardening.heats
+    determinant, cof, heats = det(space), cofactor(space), hardening.heats
     law = Law(Constants, None, None, None, history=history)
     row = history_row(space, law)
-    trial, most, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
+    trial, size, flowed, rebased, moduli, in_space = elastic_kinematics(space, row)
 
     @wp.func
     def temperature(h: row) -> real:
@@ -115,27 +115,44 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
         return real(0.0)
 
     @wp.func
-    def flow(e: full, h: row, dt: real, c: Constants) -> pair:
-        """Δ that a trial strain dev e causes, and what it leaves of dev e."""
-        norm = wp.sqrt(wp.ddot(e, e))
-        delta = increment(real(2.0) * real(shortened) * c.mu * norm, h[6], temperature(h), dt, c)
+    def flow(size: real, h: row, dt: real, c: Constants) -> pair:
+        """Δ that a trial strain |dev e| causes, and the share of it that is left."""
+        delta = increment(real(2.0) * real(shortened) * c.mu * size, h[6], temperature(h), dt, c)
         if delta == real(0.0):
             return pair(delta, real(1.0))
-        return pair(delta, real(1.0) - real(shortened) * delta / norm)
+        return pair(delta, real(1.0) - real(shortened) * delta / size)
+
+    @wp.func
+    def flown(size: real, h: row, dt: real, c: Constants):
+        """The history of a trial strain |dev e| but for its C_p⁻¹, the share of it that is left, what it dissipated."""
+        found, T = flow(size, h, dt, c), temperature(h)
+        delta, out, work = found[0], h, real(0.0)
+        if delta != real(0.0):
+            speed = delta / dt
+            y = yield_stress(h[6], speed, T, c) + yield_stress(h[6] + delta, speed, T, c)
+            work = real(0.5) * y * delta
+            out[6] = h[6] + delta
+            out[7] = h[7] + work
+            if wp.static(heats):
+                out[8] = h[8] + c.heating * work
+        return out, found[1], work
 
     @wp.func
     def stress(F: mat, rate: mat, h: row, dt: real, c: Constants) -> mat:
         e = trial(F, h)
-        e = e * (real(2.0) * c.mu * flow(e, h, dt, c)[1])
-        pressure = wp.identity(n=wp.static(dim), dtype=real) * (c.kappa * wp.log(determinant(F)))
-        tau = pressure + in_space(e)
-        return tau @ wp.transpose(invert(F))
+        tau = in_space(e) * (real(2.0) * c.mu * flow(wp.sqrt(wp.ddot(e, e)), h, dt, c)[1])
+        J = determinant(F)
+        for i in range(wp.static(dim)):
+            tau[i, i] += c.kappa * wp.log(J)
+        return (tau @ cof(F)) * (real(1.0) / J)
+
+    @wp.func
+    def stored(size: real, ln_J: real, c: Constants) -> real:
+        return real(0.5) * c.kappa * ln_J * ln_J + c.mu * size * size
 
     @wp.func
     def energy(F: mat, h: row, c: Constants) -> real:
-        e = trial(F, h)
-        volumetric = wp.log(determinant(F))
-        return real(0.5) * c.kappa * volumetric * volumetric + c.mu * wp.ddot(e, e)
+        return stored(size(F, h), wp.log(determinant(F)), c)
 
     @wp.func
     def wave_moduli(F: mat, h: row, c: Constants) -> pair:
@@ -143,22 +160,9 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
 
     @wp.func
     def update(F: mat, rate: mat, h: row, dt: real, c: Constants):
-        T = temperature(h)
-        if real(2.0) * real(shortened) * c.mu * most(F, h) < yield_stress(h[6], real(0.0), T, c):
-            return F, h, real(0.0)
-        e = trial(F, h)
-        found = flow(e, h, dt, c)
-        delta = found[0]
-        if delta == real(0.0):
-            return F, h, real(0.0)
-        speed = delta / dt
-        y = yield_stress(h[6], speed, T, c) + yield_stress(h[6] + delta, speed, T, c)
-        work = real(0.5) * y * delta
-        out = flowed(F, h, e * found[1])
-        out[6] = h[6] + delta
-        out[7] = h[7] + work
-        if wp.static(heats):
-            out[8] = h[8] + c.heating * work
+        out, share, work = flown(size(F, h), h, dt, c)
+        if share < real(1.0):
+            out = flowed(F, out, share)
         return F, out, work
 
     @wp.func
@@ -173,4 +177,97 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
         return y / (y + real(3.0) * c.mu * h[6])
 
     parts = {"stress": stress, "energy": energy, "wave_moduli": wave_moduli, "secant": secant}
-    return law._replace(**parts, update=update, rebase=rebase)
+    law = law._replace(**parts, update=update, rebase=rebase)
+    return law._replace(eights=_in_eights(space, law, flow, flown, stored))
+
+
+def _in_eights(space: Space, law: Law, flow: wp.Function, flown: wp.Function, stored: wp.Function) -> Eights:
+    """The law's stress, energy and update for eight particles at once."""
+    real, mat, row, Constants = space.real, space.mat, history_row(space, law), law.Constants
+    eight, (measure, stress_of, flow_of) = space.row(EIGHT), plastic_eights(space, row)
+    pair, two_eights, of_size = space.row(2), matrix_type(2, EIGHT, real), moduli_of_size(real)
+    one_stress, one_energy, one_update, moduli_of = law.stress, law.energy, law.update, law.wave_moduli
+
+    @wp.func
+    def stress(
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        first: int,
+        own: int,
+        count: int,
+        dt: real,
+        c: Constants,
+        P: wp.array(dtype=mat),
+    ):
+        size, t, s = measure(F, history, first, own, count), eight(), eight()
+        for k in range(count):
+            t[k] = c.kappa * size[1, k]
+            if size[0, k] == size[0, k]:
+                s[k] = real(2.0) * c.mu * flow(size[0, k], history[own + k], dt, c)[1]
+        stress_of(F, history, first, own, count, t, s, P)
+        for k in range(count):
+            if size[0, k] != size[0, k]:
+                P[first + k] = one_stress(F[first + k], mat(), history[own + k], dt, c)
+
+    @wp.func
+    def energy(
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        first: int,
+        own: int,
+        count: int,
+        c: Constants,
+        out: wp.array(dtype=wp.float64),
+    ):
+        size = measure(F, history, first, own, count)
+        for k in range(count):
+            if size[0, k] == size[0, k]:
+                out[first + k] = wp.float64(stored(size[0, k], size[1, k], c))
+            else:
+                out[first + k] = wp.float64(one_energy(F[first + k], history[own + k], c))
+
+    @wp.func
+    def wave_moduli(
+        F: wp.array(dtype=mat), history: wp.array(dtype=row), first: int, own: int, count: int, c: Constants
+    ) -> two_eights:
+        size, out = measure(F, history, first, own, count), two_eights()
+        for k in range(count):
+            M = pair()
+            if wp.static(space.dim == 3) and size[0, k] == size[0, k]:
+                M = of_size(size[0, k], c.kappa * size[1, k], c.mu, c.kappa)
+            else:
+                M = moduli_of(F[first + k], history[own + k], c)
+            out[0, k] = M[0]
+            out[1, k] = M[1]
+        return out
+
+    @wp.func
+    def update(
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+        first: int,
+        own: int,
+        count: int,
+        dt: real,
+        c: Constants,
+        lost: wp.array(dtype=real),
+    ):
+        size, left = measure(F, history, first, own, count), eight()
+        any_flows = bool(False)
+        for k in range(count):
+            left[k] = real(1.0)
+            if size[0, k] == size[0, k]:
+                h, share, work = flown(size[0, k], history[own + k], dt, c)
+                left[k] = share
+                if share < real(1.0):
+                    any_flows = True
+                history[own + k] = h
+                lost[first + k] = work
+            else:
+                _F, h_k, work_k = one_update(F[first + k], mat(), history[own + k], dt, c)
+                history[own + k] = h_k
+                lost[first + k] = work_k
+        if any_flows:
+            flow_of(F, history, first, own, count, left)
+
+    return Eights(stress, energy, wave_moduli, update)

@@ -5,6 +5,7 @@ law does to volume is a number of its own.
 """
 
 import functools
+import math
 from typing import Any, NamedTuple
 
 import warp as wp
@@ -12,7 +13,7 @@ import warp as wp
 from ..linalg import det, reciprocal_cube_root, symmetric_bounds
 from ..space import Space, matrix_type
 from .base import Variable
-from .log_strain import deviatoric_logarithm, exponential
+from .log_strain import strain_functions
 
 #: Begins the history of a law that flows.
 METRIC = Variable(
@@ -28,15 +29,15 @@ class Kinematics(NamedTuple):
 
     Attributes:
         trial: (F, h) -> dev e (full).
-        most: (F, h) -> a bound of |dev e|, without the series: |ln(1 − x)| ≤ x/(1 − x).
-        flowed: (F, h, dev e) -> h whose C_p⁻¹ leaves this of the elastic strain.
+        size: (F, h) -> |dev e|.
+        flowed: (F, h, share) -> h whose C_p⁻¹ leaves this share of dev e.
         rebased: (F, h) -> (F, h) of the same det F and dev e, with what is left of F after plastic flow.
         moduli: (F, h, t, μ, κ) -> (M, μ_s) as ``Law.wave_moduli``, t = tr τ/3, of Ψ = ψ(ln J) + μ |dev e|², ψ'' = κ.
         in_space: full -> its part in the space.
     """
 
     trial: wp.Function
-    most: wp.Function
+    size: wp.Function
     flowed: wp.Function
     rebased: wp.Function
     moduli: wp.Function
@@ -44,12 +45,44 @@ class Kinematics(NamedTuple):
 
 
 @functools.cache
+def elastic_moduli(real: type) -> wp.Function:
+    """``wp.func`` (below, apart, t, μ, κ) -> (M, μ_s) as ``Law.wave_moduli`` of Ψ = ψ(ln J) + μ |dev e|² with ψ'' = κ.
+
+    t = tr τ/3; of 2 dev e the least eigenvalue is no more ``below`` zero, and eigenvalues are no more ``apart``.
+    """
+    pair = Space(3, real).row(2)
+
+    @wp.func
+    def elastic_moduli(below: real, apart: real, t: real, mu: real, kappa: real) -> pair:
+        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) ≤ μ (1 + x) with x = 2 (e_i − e_j) for shear
+        shear = mu * (real(1.0) + apart)
+        M = kappa + real(4.0) / real(3.0) * mu * (real(1.0) + real(0.25) * apart * apart)
+        return pair(wp.max(M - t + mu * below, shear), shear)
+
+    return elastic_moduli
+
+
+@functools.cache
+def moduli_of_size(real: type) -> wp.Function:
+    """``wp.func`` (|dev e|, t, μ, κ) -> the same where the eigenvalues are three in sum zero: √(2/3) and √2 |dev e|."""
+    pair, moduli = Space(3, real).row(2), elastic_moduli(real)
+    below, apart = 2.0 * math.sqrt(2.0 / 3.0), 2.0 * math.sqrt(2.0)
+
+    @wp.func
+    def moduli_of_size(size: real, t: real, mu: real, kappa: real) -> pair:
+        return moduli(real(below) * size, real(apart) * size, t, mu, kappa)
+
+    return moduli_of_size
+
+
+@functools.cache
 def elastic_kinematics(space: Space, row: Any) -> Kinematics:
     """The functions for rows of history of this type."""
     real, mat, pair, dim = space.real, space.mat, space.row(2), space.dim
-    full = matrix_type(3, 3, real)
+    full, strain = matrix_type(3, 3, real), space.row(8)
     determinant, bounds, root = det(space), symmetric_bounds(space), reciprocal_cube_root(real)
-    logarithm, exp = deviatoric_logarithm(real), exponential(real)
+    of_size, of_bounds = moduli_of_size(real), elastic_moduli(real)
+    deviator, logarithm, size_of, power = strain_functions(real)
 
     @wp.func
     def extended(F: mat) -> full:
@@ -69,27 +102,29 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
         return out
 
     @wp.func
-    def left_elastic(F: mat, h: row) -> full:
-        """b_e = F C_p⁻¹ Fᵀ."""
-        G = extended(F)
-        return G @ full(h[0], h[3], h[4], h[3], h[1], h[5], h[4], h[5], h[2]) @ wp.transpose(G)
+    def pulled(F: mat, h: row) -> full:
+        """H = F C_p⁻¹."""
+        return extended(F) @ full(h[0], h[3], h[4], h[3], h[1], h[5], h[4], h[5], h[2])
+
+    @wp.func
+    def elastic(F: mat, h: row) -> strain:
+        """What the functions of log_strain.py take of b_e = F C_p⁻¹ Fᵀ."""
+        return deviator(pulled(F, h), extended(F))
 
     @wp.func
     def trial(F: mat, h: row) -> full:
-        return logarithm(left_elastic(F, h)) * real(0.5)
+        return logarithm(elastic(F, h)) * real(0.5)
 
     @wp.func
-    def most(F: mat, h: row) -> real:
-        b = left_elastic(F, h)
-        X = wp.identity(n=3, dtype=real) - b * (real(3.0) / wp.trace(b))
-        norm = wp.sqrt(wp.ddot(X, X))
-        return real(0.5) * norm / wp.max(real(1.0) - norm, real(0.0))
+    def size(F: mat, h: row) -> real:
+        return size_of(elastic(F, h)) * real(0.5)
 
     @wp.func
-    def flowed(F: mat, h: row, e: full) -> row:
-        J = determinant(F)
-        G = wp.inverse(extended(F)) * (J * root(J) * root(J))
-        C = G @ exp(e * real(2.0)) @ wp.transpose(G)
+    def flowed(F: mat, h: row, share: real) -> row:
+        # J^⅔ F⁻¹ exp(2 share dev e) F⁻ᵀ, which is F⁻¹ b_e^share F⁻ᵀ times a number, and F⁻¹ = Hᵀ b_e⁻¹
+        H = pulled(F, h)
+        C = wp.transpose(H) @ power(elastic(F, h), share - real(2.0)) @ H
+        C = C * root(wp.determinant(C))
         out = h
         for k in range(3):
             out[k] = C[k, k]
@@ -103,8 +138,10 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
         out = h
         F_e = F
         if wp.static(dim > 1):
-            J = determinant(F)
-            V = exp(trial(F, h)) * (J * root(J) * root(J))
+            J, V = determinant(F), power(elastic(F, h), real(0.5))  # V times a number
+            ratio = J / wp.determinant(V)
+            V = V * (ratio * root(ratio) * root(ratio))
+            V += V * ((J - wp.determinant(V)) / (real(3.0) * J))  # round-off of det F would add up
             s = real(1.0)
             if wp.static(dim == 2):
                 s = wp.sqrt(V[2, 2])  # so that det F stays J
@@ -118,19 +155,12 @@ def elastic_kinematics(space: Space, row: Any) -> Kinematics:
 
     @wp.func
     def moduli(F: mat, h: row, t: real, mu: real, kappa: real) -> pair:
-        # Along principal directions κ + 4/3 μ − τ_i, and μ x/(1 − e^(−x)) with x = 2 (e_i − e_j) for shear. Of the
-        # stretches over J^(1/3), squared, a bound a ≥ 1 and c ≤ 1 give logarithms: ln a ≤ a − 1, −ln c ≤ 1/c − 1
-        J = determinant(F)
-        b = bounds(in_space(left_elastic(F, h)))
-        isochoric = root(J) * root(J)
-        largest = b[1] * isochoric
-        least = b[0] * isochoric
         if wp.static(dim == 3):
-            least = wp.max(least, real(1.0) / (largest * largest))  # the bound may be negative, the determinant is 1
-        flattened = real(1.0) / least - real(1.0)
-        spread = largest - real(1.0) + flattened
-        shear = mu * (real(1.0) + spread)
-        M = kappa + real(4.0) / real(3.0) * mu * (real(1.0) + real(0.25) * spread * spread)
-        return pair(wp.max(M - t + mu * flattened, shear), shear)
+            return of_size(size(F, h), t, mu, kappa)
+        # Of the stretches over J^(1/3), squared, the largest and the least in the space: ln a ≤ a − 1, −ln c ≤ 1/c − 1
+        J = determinant(F)
+        b = bounds(in_space(pulled(F, h) @ wp.transpose(extended(F)))) * (root(J) * root(J))
+        below = real(1.0) / b[0] - real(1.0)
+        return of_bounds(below, b[1] - real(1.0) + below, t, mu, kappa)
 
-    return Kinematics(trial, most, flowed, rebased, moduli, in_space)
+    return Kinematics(trial, size, flowed, rebased, moduli, in_space)

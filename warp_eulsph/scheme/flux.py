@@ -1,287 +1,22 @@
 """The flux of momentum: stress in the reference, body by body (M1), the wave speeds there, and what laws remember."""
 
-import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import warp as wp
 
-from ..atomics import lower_to, raise_to
-from ..execution import Launcher
-from ..fields import allocate, clock_structure, structure
-from ..linalg import det, inverse, largest_shortening
+from ..execution import Launcher, simd
+from ..fields import allocate
 from ..materials import Law, Material
-from ..materials.base import history_row, long_form
+from ..materials.base import Eights, history_row
+from ..materials.in_eights import EIGHT
 from ..space import Space
 from ..structs import ClockArrays, FluxArrays, ParticleArrays
-from .laws import constants_of_body, kinds_of, laws_structure
+from . import flux_eights
+from . import flux_kernels as kernels
+from .laws import Kind, kinds_of
 from .policy import Always, Every, ReferencePolicy
-from .reference import Configuration, resolution
-
-
-@functools.cache
-def velocity_gradient(space: Space, fixed: bool) -> wp.Function:
-    """``wp.func`` l = Ḟ F⁻¹ of particle a, whose deformation gradient is F, from ∇_k v."""
-    mat, Reference, invert = space.mat, structure(space, "Reference"), inverse(space)
-
-    @wp.func
-    def velocity_gradient(a: int, F: mat, grad_v: mat, reference: Reference) -> mat:
-        if wp.static(fixed):
-            return grad_v @ invert(F)
-        return grad_v @ reference.F[a] @ invert(F)
-
-    return velocity_gradient
-
-
-@functools.cache
-def _make_flux(space: Space, law: Law, several: bool, fixed: bool, dual: bool) -> wp.Kernel:
-    mat, real, determinant = space.mat, space.real, det(space)
-    Reference, Flux, Clock = structure(space, "Reference"), structure(space, "Flux"), clock_structure(space)
-    Laws, row, remembers = laws_structure(law), history_row(space, law), bool(law.history)
-    P_of, rate_of = long_form(space, law).stress, velocity_gradient(space, fixed)
-    Particles, constants_of = structure(space, "Particles"), constants_of_body(space, law, several)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def compute_flux(
-        first: int,
-        begin: int,
-        F: wp.array(dtype=mat),
-        grad_v: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        particles: Particles,
-        reference: Reference,
-        clock: Clock,
-        fraction: wp.float64,
-        laws: Laws,
-        flux: Flux,
-    ):
-        a = first + wp.tid()
-        c = constants_of(a, particles, laws)
-        rate = mat()
-        h = row()
-        ahead = real(0.0)
-        if wp.static(remembers):
-            rate = rate_of(a, F[a], grad_v[a], reference)
-            h = history[a - begin]
-            ahead = real(fraction * clock.dt[0])
-        Q = P_of(F[a], rate, h, ahead, c)
-        if wp.static(not fixed):
-            F_k = reference.F[a]
-            Q = Q @ wp.transpose(F_k) / determinant(F_k)
-        flux.Q[a] = Q
-        if wp.static(dual):
-            flux.Pi[a] = Q @ wp.transpose(reference.L[a])
-
-    return compute_flux
-
-
-@functools.cache
-def rate_with_viscosity(real: type) -> wp.Function:
-    """``wp.func`` (rate of waves r, of viscosity s) -> what Δt is to be counted by [1/s] (M22).
-
-    Waves of the frequency ω ≤ 2 r and the decay λ ≤ 4 s, of the same operator, are stable in a step that takes the
-    viscous force at its start where (ω Δt)² + 2 λ Δt ≤ 4, by determinant and trace of a step: r² Δt² + 2 s Δt ≤ 1.
-    """
-
-    @wp.func
-    def rate_with_viscosity(r: real, s: real) -> real:
-        return s + wp.sqrt(s * s + r * r)
-
-    return rate_with_viscosity
-
-
-# Largest |∇v| Δt over the Courant number. Single particles can outrun the waves where an arrangement is lost, and would
-# pass through their neighbours in one step: without this the punch at 50² to 90² fails now and then.
-STRAIN = 0.25
-
-
-@functools.cache
-def _make_wave_speeds(space: Space, law: Law, several: bool, fixed: bool) -> wp.Kernel:
-    real, mat = space.real, space.mat
-    Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
-    Clock, Laws, dim = clock_structure(space), laws_structure(law), float(space.dim)
-    row, remembers, moduli = history_row(space, law), bool(law.history), long_form(space, law).wave_moduli
-    drag_of, viscous, rate_of = law.viscosity, law.viscosity is not None, velocity_gradient(space, fixed)
-    invert, shortening_of = inverse(space), largest_shortening(space)
-    raise_rate, resolution_of, with_viscosity = raise_to(real), resolution(space), rate_with_viscosity(real)
-    constants_of = constants_of_body(space, law, several)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def wave_speeds(
-        first: int,
-        begin: int,
-        F: wp.array(dtype=mat),
-        grad_v: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        particles: Particles,
-        reference: Reference,
-        laws: Laws,
-        flux: Flux,
-        clock: Clock,
-    ):
-        a = first + wp.tid()
-        c = constants_of(a, particles, laws)
-        # A wave of speed c runs at c |G⁻¹| when distances are measured in the reference, G = F F_k⁻¹.
-        G = F[a]
-        if wp.static(not fixed):
-            G = G @ invert(reference.F[a])
-        shortening = shortening_of(G)  # squared
-        h = row()
-        if wp.static(remembers):
-            h = history[a - begin]
-        M = moduli(F[a], h, c)
-        per_density = shortening * particles.V0[a] / particles.mass[a]
-        speed = wp.sqrt(wp.max(M[0], real(0.0)) * per_density)
-        shear_speed = wp.sqrt(wp.max(M[1], real(0.0)) * per_density)
-        rho_k = particles.mass[a] / reference.V[a]
-        flux.speed[a] = speed
-        flux.impedance[a] = rho_k * speed
-        flux.shear_impedance[a] = rho_k * shear_speed
-        if wp.static(fixed):
-            per_length = reference.resolution[a]
-        else:
-            per_length = resolution_of(a, particles, reference)
-        rate = speed * per_length
-        if wp.static(viscous):
-            nu = drag_of(F[a], rate_of(a, F[a], grad_v[a], reference), h, c) * per_density
-            rate = with_viscosity(rate, nu * per_length * per_length)
-        # |∇v G⁻¹| ≤ |∇v| |G⁻¹| and, of the bound, |G⁻¹|² ≤ d · shortening: seldom is more than that asked for
-        strain_rate = real(STRAIN) * rate
-        if wp.ddot(grad_v[a], grad_v[a]) * shortening * real(dim) > strain_rate * strain_rate:
-            D = grad_v[a] @ invert(G)
-            rate = wp.max(rate, wp.sqrt(wp.ddot(D, D)) / real(STRAIN))
-        raise_rate(clock.rate, rate)
-
-    return wave_speeds
-
-
-@functools.cache
-def _make_moduli(space: Space, law: Law) -> wp.Kernel:
-    """Kernel of one thread: the wave moduli at F = I."""
-    real, dim, pair, Constants = space.real, space.dim, space.row(2), law.Constants
-    row, moduli = history_row(space, law), long_form(space, law).wave_moduli
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def moduli_at_rest(start: wp.array(dtype=row), c: Constants, out: wp.array(dtype=pair)):
-        M = moduli(wp.identity(n=wp.static(dim), dtype=real), start[0], c)
-        out[0] = pair(M[0], M[1])
-
-    return moduli_at_rest
-
-
-@functools.cache
-def _make_energy(space: Space, law: Law, several: bool) -> wp.Kernel:
-    mat, row, remembers = space.mat, history_row(space, law), bool(law.history)
-    Particles, Laws, density = structure(space, "Particles"), laws_structure(law), long_form(space, law).energy
-    constants_of = constants_of_body(space, law, several)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def energy(
-        first: int,
-        begin: int,
-        F: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        particles: Particles,
-        laws: Laws,
-        out: wp.array(dtype=wp.float64),
-    ):
-        a = first + wp.tid()
-        c = constants_of(a, particles, laws)
-        h = row()
-        if wp.static(remembers):
-            h = history[a - begin]
-        out[a] = wp.float64(particles.V0[a] * density(F[a], h, c))
-
-    return energy
-
-
-@functools.cache
-def _make_forget(space: Space, law: Law, several: bool) -> wp.Kernel:
-    """Kernel: what a law without a history leaves of F after a full step."""
-    mat, Laws, kept = space.mat, laws_structure(law), law.update
-    Particles, constants_of = structure(space, "Particles"), constants_of_body(space, law, several)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def forget(first: int, F: wp.array(dtype=mat), particles: Particles, laws: Laws):
-        a = first + wp.tid()
-        c = constants_of(a, particles, laws)
-        F[a] = kept(F[a], c)
-
-    return forget
-
-
-@functools.cache
-def _make_update(space: Space, law: Law, several: bool, fixed: bool, tied: bool) -> wp.Kernel:
-    """Kernel: the history after a full step and the energy that it dissipated; a step of length zero changes nothing.
-
-    A particle whose history is not finite is bad: its law found no state. Where the law yields and is ``tied``, so does
-    the tie (M16).
-    """
-    real, mat, row, length = space.real, space.mat, history_row(space, law), len(law.start)
-    Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
-    Flux, Laws, updated = structure(space, "Flux"), laws_structure(law), law.update
-    rate_of, secant_of = velocity_gradient(space, fixed), law.secant
-    constants_of = constants_of_body(space, law, several)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def update(
-        first: int,
-        begin: int,
-        F: wp.array(dtype=mat),
-        grad_v: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        particles: Particles,
-        reference: Reference,
-        clock: Clock,
-        laws: Laws,
-        flux: Flux,
-    ):
-        a = first + wp.tid()
-        c = constants_of(a, particles, laws)
-        flux.dissipated[a] = real(0.0)
-        if wp.static(tied):
-            flux.slipped[a] = real(0.0)
-        dt = real(clock.dt[0])
-        if dt > real(0.0):
-            rate = rate_of(a, F[a], grad_v[a], reference)
-            F_a, h, lost = updated(F[a], rate, history[a - begin], dt, c)
-            F[a] = F_a
-            history[a - begin] = h
-            flux.dissipated[a] = particles.V0[a] * lost
-            if wp.static(tied):
-                secant = wp.sqrt(secant_of(h, c))
-                flux.slipped[a] = (flux.secant[a] - secant) * flux.tied[a]
-                flux.secant[a] = secant
-            nothing = real(0.0)  # NaN as soon as a component is not finite
-            for i in range(wp.static(length)):
-                nothing += h[i] * real(0.0)
-            if nothing != real(0.0):
-                lower_to(clock.bad, a)
-
-    return update
-
-
-@functools.cache
-def _make_rebase(space: Space, law: Law, several: bool) -> wp.Kernel:
-    """Kernel: F and history as a new reference takes them."""
-    mat, row, Laws, rebased = space.mat, history_row(space, law), laws_structure(law), law.rebase
-    Particles, constants_of = structure(space, "Particles"), constants_of_body(space, law, several)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def rebase(
-        first: int,
-        begin: int,
-        F: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        particles: Particles,
-        laws: Laws,
-    ):
-        a = first + wp.tid()
-        c = constants_of(a, particles, laws)
-        F_a, h = rebased(F[a], history[a - begin], c)
-        F[a] = F_a
-        history[a - begin] = h
-
-    return rebase
+from .reference import Configuration
 
 
 def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> None:
@@ -314,7 +49,7 @@ class Flux:
         self, space: Space, bodies: list[tuple[Material, int]], particles: ParticleArrays, device: wp.DeviceLike
     ):
         self.space, self.particles, self.device = space, particles, device
-        self._launch = Launcher(device)
+        self._launch, self._simd = Launcher(device), simd(device)
         self.kinds = kinds_of(space, bodies, particles, device)
         self.parts = [part for kind in self.kinds for part in kind.parts]
         n = sum(part.size for part in self.parts)
@@ -347,7 +82,7 @@ class Flux:
             row = history_row(self.space, part.law)
             start = wp.array([row(*part.law.start)], dtype=row, device=self.device)
             arguments = [start, part.constants, out]
-            self._launch.once(_make_moduli(self.space, part.law), 1, arguments)
+            self._launch.once(kernels.make_moduli(self.space, part.law), 1, arguments)
             found.append((float(out.numpy()[0, 0]), float(out.numpy()[0, 1])))
         return found
 
@@ -358,41 +93,76 @@ class Flux:
 
         F is ``fraction`` Δt ahead of the histories, moved by ``grad_v`` = ∇_k v.
         """
-        dual = len(self.fields.Pi) > 0
+        space, fixed, dual = self.space, configuration.fixed, len(self.fields.Pi) > 0
         for kind in self.kinds:
             arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields, clock, fraction]
-            kernel = _make_flux(self.space, kind.law, kind.several, configuration.fixed, dual)
-            self._launch(kernel, kind.size, [*arguments, kind.laws, self.fields], kind.first)
+            self._run(
+                kind,
+                [*arguments, kind.laws, self.fields],
+                lambda law, several: kernels.make_flux(space, law, several, fixed, dual),
+                lambda law, eights: flux_eights.make_flux(space, law, eights, fixed, dual),
+            )
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """Wave speeds measured in the reference; raise ``clock.rate`` to the largest rate of waves or strain [1/s]."""
+        space, fixed = self.space, configuration.fixed
         for kind in self.kinds:
             arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields]
-            kernel = _make_wave_speeds(self.space, kind.law, kind.several, configuration.fixed)
-            self._launch(kernel, kind.size, [*arguments, kind.laws, self.fields, clock], kind.first)
+            self._run(
+                kind,
+                [*arguments, kind.laws, self.fields, clock],
+                lambda law, several: kernels.make_wave_speeds(space, law, several, fixed),
+                lambda law, eights: flux_eights.make_wave_speeds(space, law, eights, fixed),
+            )
 
     def energy(self, F: wp.array, out: wp.array) -> None:
         """Stored energy [J] of each particle."""
+        space = self.space
         for kind in self.kinds:
             arguments = [kind.first, F, kind.history, self.particles, kind.laws, out]
-            self._launch(_make_energy(self.space, kind.law, kind.several), kind.size, arguments, kind.first)
+            self._run(
+                kind,
+                arguments,
+                lambda law, several: kernels.make_energy(space, law, several),
+                lambda law, eights: flux_eights.make_energy(space, law, eights),
+            )
 
     def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
         """After a full step that ``grad_v`` = ∇_k v made: what each law keeps of F, its history, what it dissipated."""
+        space, fixed, tied = self.space, configuration.fixed, len(self.fields.slipped) > 0
         for kind in self.kinds:
             law = kind.law
             if law.history and law.update is not None:
                 arguments = [kind.first, F, grad_v, kind.history, self.particles, configuration.fields, clock]
-                tied = law.secant is not None and len(self.fields.slipped) > 0
-                kernel = _make_update(self.space, law, kind.several, configuration.fixed, tied)
-                self._launch(kernel, kind.size, [*arguments, kind.laws, self.fields], kind.first)
+                self._run(
+                    kind,
+                    [*arguments, kind.laws, self.fields],
+                    lambda law, several: kernels.make_update(
+                        space, law, several, fixed, law.secant is not None and tied
+                    ),
+                    lambda law, eights: flux_eights.make_update(space, law, eights, law.secant is not None and tied),
+                )
             elif law.update is not None:
-                kernel = _make_forget(self.space, law, kind.several)
+                kernel = kernels.make_forget(self.space, law, kind.several)
                 self._launch(kernel, kind.size, [F, self.particles, kind.laws], kind.first)
+
+    def _run(
+        self,
+        kind: Kind,
+        arguments: Sequence[Any],
+        make: Callable[[Law, bool], wp.Kernel],
+        make_of_eights: Callable[[Law, Eights], wp.Kernel],
+    ) -> None:
+        """Launch over the particles of a kind, eight at once where that is to be done."""
+        law = kind.law
+        if law.eights is None or kind.several or not self._simd:
+            self._launch(make(law, kind.several), kind.size, arguments, kind.first)
+        else:
+            self._launch(make_of_eights(law, law.eights), -(-kind.size // EIGHT), arguments, each=EIGHT)
 
     def rebase(self, F: wp.array) -> None:
         """Before a refresh: F and histories as the new reference takes them."""
         for kind in self.kinds:
             if kind.law.rebase is not None:
                 arguments = [kind.first, F, kind.history, self.particles, kind.laws]
-                self._launch(_make_rebase(self.space, kind.law, kind.several), kind.size, arguments, kind.first)
+                self._launch(kernels.make_rebase(self.space, kind.law, kind.several), kind.size, arguments, kind.first)
