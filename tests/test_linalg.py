@@ -10,6 +10,7 @@ from warp_eulsph import Space
 from warp_eulsph.linalg import (
     largest_shortening,
     reciprocal_cube_root,
+    reciprocal_power,
     stretch_bounds,
     stretch_of_volume,
     symmetric_bounds,
@@ -99,7 +100,29 @@ def test_roots_are_right_to_the_last_place(space):
     assert np.abs(out.numpy()[:-3] * np.cbrt(wide) - 1.0).max() <= eps(space)
     assert np.isnan(out.numpy()[-3:]).all()
     assert np.abs(stretches.numpy()[:-3] / wide ** (np.longdouble(1) / space.dim) - 1.0).max() <= 4 * eps(space)
-    assert (stretches.numpy()[-3:-1] == 0.0).all()
+    assert (stretches.numpy()[-3:-1] == 0.0).all() and np.isnan(stretches.numpy()[-1])
+
+
+@functools.cache
+def _make_powers(real):
+    power = reciprocal_power(real)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def powers(x: wp.array(dtype=real), p: real, out: wp.array(dtype=real)):
+        out[wp.tid()] = power(x[wp.tid()], p)
+
+    return powers
+
+
+@pytest.mark.parametrize("dtype", [wp.float32, wp.float64])
+@pytest.mark.parametrize("p", [1.0, 6.0, 7.0, 16.0, 17.0, 0.4, 6.5])
+def test_powers_are_right(p, dtype):
+    """Each product rounds once, and what 1/x has lost comes p times: some p + 4 units in the last place."""
+    numpy = np.float32 if dtype is wp.float32 else np.float64
+    x = np.random.default_rng(0).uniform(0.3, 3.0, 10_000).astype(numpy)
+    out = wp.zeros(len(x), dtype=dtype)
+    wp.launch(_make_powers(dtype), len(x), [wp.array(x, dtype=dtype), p, out])
+    assert np.abs(out.numpy() * np.longdouble(x) ** numpy(p) - 1.0).max() <= (p + 4.0) * np.finfo(numpy).eps
 
 
 @functools.cache

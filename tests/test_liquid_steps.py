@@ -48,9 +48,9 @@ def test_simd_equals_portable(dim, dtype):
         flows[simd] = simulation.stepper.medium.volumes.change.numpy().astype(float)
     assert_equal_to_round_off(found[False], found[True], dtype)
     assert not np.array_equal(*flows.values())  # it is another kernel
-    # Volume flows by what two pressures differ by beyond their gradients: of the pressures a hundredth. In three of
-    # eight runs with other velocities one of a thousand J is rounded the other way: ρc² ε is 850 ε of the pressures
-    bound = 1e4 * np.finfo(np.float32 if dtype is wp.float32 else float).eps
+    # Volume flows by what two pressures differ by beyond their gradients, a hundredth of them. In half of such runs
+    # with other velocities a particle of a thousand has s of F = s I rounded the other way: p by d ρc² ε, 2600 ε of it
+    bound = 3e4 * np.finfo(np.float32 if dtype is wp.float32 else float).eps
     assert np.abs(flows[True] - flows[False]).max() <= bound * np.abs(flows[False]).max()
 
 

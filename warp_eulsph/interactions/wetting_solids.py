@@ -10,9 +10,8 @@ from ..atomics import raise_to
 from ..boundaries import Assembly
 from ..execution import Launcher
 from ..fields import clock_structure, structure
-from ..operators.neighbours import QUERY_MARGIN
+from ..operators.neighbours import QUERY_MARGIN, make_longest
 from ..reduce import Sum
-from ..scheme.reference import LARGEST_GROWTH
 from ..space import Space
 from ..weights import Weight
 from ..weights.base import pair_weight
@@ -194,13 +193,14 @@ def _make_force(weight: Weight, space: Space) -> wp.Kernel:
 def _make_reaction(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: the opposite on the solids."""
     vec, real, vec3, pair = space.vec, space.real, _grid_vector(space), _pair(weight, space)
+    support = float(weight.support) * QUERY_MARGIN
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
 
     @wp.kernel(module="unique", enable_backward=False)
     def force_on_solid(
         first: int,
         liquid: wp.uint64,
-        reach: real,
+        longest: wp.array(dtype=real),
         at: wp.array(dtype=vec3),
         V: wp.array(dtype=real),
         places: wp.array(dtype=wp.int32),
@@ -214,7 +214,7 @@ def _make_reaction(weight: Weight, space: Space) -> wp.Kernel:
     ):
         i = first + wp.tid()
         force = vec()
-        for k in wp.hash_grid_query(liquid, at[i], reach):
+        for k in wp.hash_grid_query(liquid, at[i], real(support) * longest[0]):
             a = members[k] - offset
             G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
             if wp.length_sq(G) > real(0.0):
@@ -231,13 +231,14 @@ def _make_ask(weight: Weight, space: Space) -> wp.Kernel:
     It bounds the squares of frequencies at which solids move alone against what the liquid stores.
     """
     real, vec3, pair = space.real, _grid_vector(space), _pair(weight, space)
+    support = float(weight.support) * QUERY_MARGIN
     Reference, Flux, raise_largest = structure(space, "Reference"), structure(space, "Flux"), raise_to(space.real)
 
     @wp.kernel(module="unique", enable_backward=False)
     def ask(
         first: int,
         liquid: wp.uint64,
-        reach: real,
+        longest: wp.array(dtype=real),
         at: wp.array(dtype=vec3),
         V: wp.array(dtype=real),
         places: wp.array(dtype=wp.int32),
@@ -253,7 +254,7 @@ def _make_ask(weight: Weight, space: Space) -> wp.Kernel:
     ):
         i = first + wp.tid()
         square = real(0.0)
-        for k in wp.hash_grid_query(liquid, at[i], reach):
+        for k in wp.hash_grid_query(liquid, at[i], real(support) * longest[0]):
             a = members[k] - offset
             size = wp.length(pair(own[k], at[i], reference.h[a], kappa[a] * V[i]))
             if size > real(0.0):
@@ -299,15 +300,13 @@ class WettingOfSolids:
         self._V = wp.array(V0, dtype=space.real, device=device)
         self._at, self._own = (wp.zeros(k, dtype=_grid_vector(space), device=device) for k in (m, n))
         self._wet = wp.zeros(n, dtype=wp.int32, device=device)
-        self._met, self._largest = (wp.zeros(k, dtype=space.real, device=device) for k in (n, 1))
+        self._met, self._largest, self._longest = (wp.zeros(k, dtype=space.real, device=device) for k in (n, 1, 1))
         sides = [64 if axis < space.dim else 1 for axis in range(3)]
         self._solids, self._liquid = (wp.HashGrid(*sides, device=device, dtype=space.real) for _ in range(2))
         self._reach = float(self._weight.support) * float(medium.particles.h.numpy().max()) * QUERY_MARGIN
         self._power, self._add = wp.zeros(n, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
-        self._nothing, self._step = (
-            wp.zeros(world.n, dtype=space.vec, device=device),
-            wp.zeros(1, dtype=wp.float64, device=device),
-        )
+        self._nothing = wp.zeros(world.n, dtype=space.vec, device=device)
+        self._step = wp.zeros(1, dtype=wp.float64, device=device)
 
     def _note(self) -> None:
         x = self.world.U.x
@@ -316,9 +315,11 @@ class WettingOfSolids:
         self.rebuild()
 
     def rebuild(self) -> None:
-        """The grids of where all were."""
+        """The grids of where all were, and the largest smoothing length of the liquid."""
         self._solids.build(self._at, self._reach)
         self._liquid.build(self._own, self._reach)
+        self._longest.zero_()
+        self._launch(make_longest(self.space), len(self._own), [self.medium.configuration.fields.h, self._longest])
 
     def renew(self) -> None:
         """Where all are in the present reference, which of the liquid is wet, and L of it."""
@@ -344,7 +345,7 @@ class WettingOfSolids:
 
     def _of_solids(self) -> list[Any]:
         medium = self.medium
-        found = [self._liquid.id, LARGEST_GROWTH * self._reach, self._at, self._V, self._places]
+        found = [self._liquid.id, self._longest, self._at, self._V, self._places]
         found += [*self._liquid_members(), medium.configuration.fields, medium.flux.fields, medium.stabiliser.kappa]
         return found
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import warp as wp
 
-from ..linalg import cofactor, det
+from ..linalg import cofactor, det, stretch_of_volume
 from ..space import Space
 from .base import Law, Material, Variable
 from .viscosity import Viscosity
@@ -90,7 +90,7 @@ def _inviscid(space: Space, Constants: Any, equation: Equation, opens: bool) -> 
 
     Where the fluid has opened, at J_o, it has the pressure and modulus of J_o, and Ψ goes on linearly.
     """
-    real, mat, dim, determinant, root = space.real, space.mat, space.dim, det(space), 1.0 / space.dim
+    real, mat, dim, determinant, stretch_of = space.real, space.mat, space.dim, det(space), stretch_of_volume(space)
     pressure_of, energy_of, modulus_of, opening_of, heat_of = equation
     heats = heat_of is not None
 
@@ -129,7 +129,7 @@ def _inviscid(space: Space, Constants: Any, equation: Equation, opens: bool) -> 
 
     @wp.func
     def kept(F: mat, c: Constants) -> mat:
-        return wp.identity(n=wp.static(dim), dtype=real) * wp.pow(determinant(F), real(root))
+        return wp.identity(n=wp.static(dim), dtype=real) * stretch_of(determinant(F))
 
     return pressure, energy, modulus, warming, kept
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import warp as wp
 
 from ..linalg import symmetric_eigen
-from ..space import Space, matrix_type
+from ..space import Space
 
 # Largest |eigenvalue| of X for which series are taken, and one that metals seldom pass, to which shorter series do.
 LARGEST, SELDOM_PASSED = 0.1, 0.02
@@ -98,12 +98,8 @@ class StrainFunctions(NamedTuple):
 @functools.cache
 def strain_functions(real: type) -> StrainFunctions:
     """The functions in this precision."""
-    mat, vec, row, eigen = (
-        matrix_type(3, 3, real),
-        Space(3, real).vec,
-        Space(3, real).row(8),
-        symmetric_eigen(Space(3, real)),
-    )
+    three = Space(3, real)
+    mat, vec, row, eigen = three.mat, three.vec, three.row(8), symmetric_eigen(three)
     small = largest_c2(LARGEST)
     begin = f"""
     #if defined(__clang__)

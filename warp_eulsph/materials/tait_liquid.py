@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import warp as wp
 
+from ..linalg import reciprocal_power
 from .base import positive
 from .fluid import Equation, Fluid
 
@@ -41,18 +42,20 @@ class TaitLiquid(Fluid):
     @staticmethod
     @functools.cache
     def make_equation(real: type, Constants: Any) -> Equation:
+        power = reciprocal_power(real)
+
         @wp.func
         def pressure(J: real, theta: real, c: Constants) -> real:
-            return c.B * (wp.pow(J, -c.gamma) - real(1.0))
+            return c.B * (power(J, c.gamma) - real(1.0))
 
         @wp.func
         def energy(J: real, theta: real, c: Constants) -> real:
-            compression = (wp.pow(J, real(1.0) - c.gamma) - real(1.0)) / (c.gamma - real(1.0))
+            compression = (power(J, c.gamma - real(1.0)) - real(1.0)) / (c.gamma - real(1.0))
             return c.B * (compression + J - real(1.0))
 
         @wp.func
         def modulus(J: real, theta: real, c: Constants) -> real:
-            return c.B * c.gamma * wp.pow(J, real(1.0) - c.gamma)
+            return c.B * c.gamma * power(J, c.gamma - real(1.0))
 
         @wp.func
         def opening(p: real, theta: real, c: Constants) -> real:

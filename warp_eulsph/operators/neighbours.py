@@ -115,7 +115,7 @@ def _make_search(space: Space, fill: bool) -> wp.Kernel:
 
 
 @functools.cache
-def _make_longest(space: Space) -> wp.Kernel:
+def make_longest(space: Space) -> wp.Kernel:
     """Kernel: the largest smoothing length."""
     real = space.real
     raise_longest = raise_to(real)
@@ -274,7 +274,7 @@ class NeighbourLists:
             self._equip()
         if not self._in_cells or self.space.periodic:
             self._h_max.zero_()
-            self._launch(_make_longest(self.space), n, [self.h, self._h_max])
+            self._launch(make_longest(self.space), n, [self.h, self._h_max])
         last = 3 - self.space.dim if self._in_cells else 0
         self._launch(_make_pad(self.space, last), n, [x, self.box, self.padded])
         if self.cells is not None:

@@ -7,6 +7,7 @@ import warp as wp
 
 from ..execution import Launcher
 from ..fields import clock_structure, neighbour_structure, structure
+from ..linalg import stretch_of_volume
 from ..materials import Law
 from ..materials.base import history_row, long_form
 from ..operators.correction import VECTORS
@@ -161,7 +162,7 @@ def _make_exchange_simd(space: Space) -> wp.Kernel:
 @functools.cache
 def _make_take(space: Space, law: Law) -> wp.Kernel:
     """Kernel: J ← (1 + ΔV/V) J; what that took of the energy is dissipated, or heat where the law takes it."""
-    real, mat, row, root = space.real, space.mat, history_row(space, law), 1.0 / space.dim
+    real, mat, row, stretch_of = space.real, space.mat, history_row(space, law), stretch_of_volume(space)
     Particles, Flux, Constants = structure(space, "Particles"), structure(space, "Flux"), law.Constants
     energy_of, remembers, heats, warmed = (
         long_form(space, law).energy,
@@ -187,7 +188,7 @@ def _make_take(space: Space, law: Law) -> wp.Kernel:
         if wp.static(remembers):
             h = history[a - begin]
             lost = flux.dissipated[a]
-        F_a = F[a] * wp.pow(real(1.0) + change[a], real(root))
+        F_a = F[a] * stretch_of(real(1.0) + change[a])
         gone = energy_of(F[a], h, c) - energy_of(F_a, h, c)
         if wp.static(heats):
             history[a - begin] = warmed(F_a, h, gone, c)
