@@ -23,12 +23,12 @@ COPPER = J2(density=8930.0, young=117e9, poisson=0.35, hardening=LinearHardening
 RADIUS, LENGTH = 3.2e-3, 32.4e-3  # m
 
 
-def build(n: int, arrangement: es.Current | es.Convected, scheme: es.Scheme) -> es.Simulation:
+def build(n: int, arrangement: es.Current | es.Convected) -> es.Simulation:
     """The rod above the wall z = 0, n particles per radius; ghosts behind the wall, as deep as the rod is wide."""
     x, volume = cylinder((0.0, 0.0, 0.0), (0.0, 0.0, LENGTH), RADIUS, RADIUS / n)
     rod = es.Body(x=x, volume=volume, material=COPPER, velocity=[0.0, 0.0, -227.0], name="rod")
     rod, wall = es.mirror(rod, point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, -1.0), depth=2.0 * RADIUS)
-    return es.Simulation(rod, boundaries=[wall], arrangement=arrangement, scheme=scheme)
+    return es.Simulation(rod, boundaries=[wall], arrangement=arrangement)
 
 
 def figures(found: dict[str, float]) -> list[Figure]:
@@ -72,7 +72,7 @@ def main(argv: list[str] | None = None) -> dict[str, float]:
     parser.add_argument("--form", choices=FORMS, default="kept", help="neighbours")
     parser.add_argument("--output", type=Path, default=Path("runs/taylor_bar"))
     args = parser.parse_args(argv)
-    simulation, writer = build(args.n, *FORMS[args.form]), SnapshotWriter(args.output)
+    simulation, writer = build(args.n, FORMS[args.form]), SnapshotWriter(args.output)
     simulation.run(END, every=10e-6, output=writer)
     writer.derive()
     draw(simulation, args.output / "taylor_bar.png")

@@ -37,7 +37,7 @@ PYTHON = {
     "shear": (8, lambda n: shear.build(n, es.Always())[0]),
     "spinning_cube": (5, lambda n: spinning_cube.build(n, es.Always())),
     "spinning_plate": (10, lambda n: spinning_plate.build(n, es.Always())),
-    "taylor_bar": (3, lambda n: taylor_bar.build(n, *taylor_bar.FORMS["kept"])),
+    "taylor_bar": (3, lambda n: taylor_bar.build(n, taylor_bar.FORMS["kept"])),
     "twisting_column": (3, lambda n: twisting_column.build(n, es.Always())),
     "vortex": (8, lambda n: vortex.build(n, es.Always(), 0.05)),
 }

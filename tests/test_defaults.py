@@ -5,15 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 import warp as wp
-from bodies import RUBBER
+from bodies import RUBBER, bits
 from fluid_laws import GAS, OIL
+from points import COPPER
 from test_wetting import RAMP, SOUND, WEIGHT, tank
 
 import warp_eulsph as es
-from warp_eulsph.defaults import COMMON, LIQUID
+from warp_eulsph.defaults import COMMON, LIQUID, YIELDING
 from warp_eulsph.geometry import box
+from warp_eulsph.materials import J2, DruckerPrager, Failing, LinearHardening, PlasticStrain, PrincipalStress
 from warp_eulsph.output.description import describe
 from warp_eulsph.validation.cases import taylor_green
+
+METAL = J2(**COPPER, hardening=LinearHardening(yield_stress=0.4e9))
 
 
 def block(material, name="body", shift=0.0, **options):
@@ -35,6 +39,43 @@ def test_each_body_takes_what_suits_its_matter():
     described = describe(mixed)
     assert described["dilation"] == 1.8 and described["bodies"]["rubber"]["dilation"] == 1.3
     assert "dilation" not in described["bodies"]["oil"]
+
+
+def test_what_yields_takes_the_stress_of_dissipation():
+    """Metals and soils do, and metal that may break; what breaks without yielding does not."""
+    torn = Failing(material=METAL, failure=PlasticStrain(energy=1e4, strain=0.2))
+    cracked = Failing(material=RUBBER, failure=PrincipalStress(energy=1e4, strength=1e6))
+    sand = DruckerPrager(density=1800.0, young=2e6, poisson=0.25, friction=30.0)
+    for material, options in ((METAL, YIELDING), (torn, YIELDING), (sand, YIELDING), (cracked, COMMON)):
+        assert chosen(es.Simulation(block(material))) == [tuple(options)]
+    mixed = es.Simulation([block(RUBBER, "rubber"), block(METAL, "metal", 2.0)])
+    assert chosen(mixed) == [tuple(COMMON), tuple(YIELDING)]
+    assert describe(mixed)["bodies"]["metal"]["scheme"]["dissipation"]["stress"] is True
+
+
+def test_bonded_bodies_take_what_suits_them_together():
+    """One that yields decides, wherever it stands; a liquid bonded to a gas is none at rest; given options stand."""
+    base, metal = block(RUBBER, "base"), block(METAL, "metal", 1.0, bonded="base")
+    cover, apart = block(RUBBER, "cover", 2.0, bonded="metal"), block(RUBBER, "apart", 5.0)
+    simulation = es.Simulation([base, metal, cover, apart])
+    assert chosen(simulation) == [tuple(YIELDING), tuple(COMMON)]
+    assert set(describe(simulation)["bodies"]["cover"]) == set(describe(simulation)["bodies"]["metal"])
+    fluids = es.Simulation([block(OIL, "oil"), block(GAS, "gas", 1.0, bonded="oil")])
+    assert chosen(fluids) == [tuple(COMMON)]
+    plain = es.Simulation([base, metal, cover], scheme=es.Verlet())
+    assert chosen(plain) == [tuple(COMMON)]
+
+
+@pytest.mark.parametrize("dtype", [wp.float32, wp.float64])
+def test_where_neighbours_are_read_anew_metal_has_the_common_form(dtype):
+    """In every bit: the stress of M9 acts where the arrangement stays, and is not in the way elsewhere."""
+    found, body = [], block(METAL)
+    body = dataclasses.replace(body, velocity=200.0 * np.sin(3.0 * body.x[:, ::-1]))
+    for options in ({}, {"scheme": COMMON.scheme}):
+        simulation = es.Simulation(body, arrangement=es.Current(), dtype=dtype, **options)
+        simulation.step(10)
+        found.append(bits(simulation))
+    assert found[0] == found[1]
 
 
 def test_half_of_the_dissipation_of_liquids_is_that_of_the_common_weight():

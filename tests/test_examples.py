@@ -141,7 +141,7 @@ def test_failed_check_ends_the_example(run):
         ("bending_column", (3, 2, es.Always())),
         ("twisting_column", (2, es.Always())),
         ("punch", (6, es.Always())),
-        ("taylor_bar", (3, es.Current(), es.Verlet())),
+        ("taylor_bar", (3, es.Current())),
         ("container", (20, 200.0)),
         ("container", (20, 200.0, 3)),
         ("elastic_gate", (2,)),

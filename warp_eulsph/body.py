@@ -40,7 +40,8 @@ class Body:
         reference, arrangement, scheme, weight, dilation: as in ``Simulation``, whose these are where they are None.
             Bodies that follow each other and agree in all of them are one medium.
         bonded: name of a body before it that it is bonded to: particles of both that are near each other are
-            neighbours, as in one solid of two materials. Both are of one medium. The outermost particles of each are
+            neighbours, as in one solid of two materials. Both are of one medium, and by default take what suits both
+            (that of metal where one of them yields). The outermost particles of each are
             still its own, so that loads on faces go to regions away from the joint.
 
     Raises:

@@ -11,6 +11,7 @@ from .body import Body, groups_of
 from .defaults import suited
 from .failure import place_of
 from .fields import allocate, part
+from .materials import Material
 from .scheme.arrangement import Arrangement
 from .scheme.base import Scheme
 from .scheme.flux import Flux, check_reference
@@ -99,10 +100,11 @@ def plan_media(bodies: Sequence[Body], defaults: Given) -> list[MediumPlan]:
         ValueError: options that do not suit a material, or schemes of different kinds.
     """
     ranges = ranges_of(bodies)
-    kind = type(options_of(bodies[0], defaults).scheme if defaults.scheme is None else defaults.scheme)
+    every = options_of_each(bodies, defaults)
+    kind = type(every[bodies[0].name].scheme if defaults.scheme is None else defaults.scheme)
     media: list[MediumPlan] = []
     for body in bodies:
-        options = options_of(body, defaults)
+        options = every[body.name]
         check_reference([body.material], options.reference)
         if type(options.scheme) is not kind:
             raise ValueError(
@@ -127,9 +129,18 @@ def plan_media(bodies: Sequence[Body], defaults: Given) -> list[MediumPlan]:
     return media
 
 
-def options_of(body: Body, defaults: Given) -> Options:
-    """The options of a body: its own, for those that are None the simulation's, then what suits its matter."""
-    found: dict[str, Any] = suited(body.material)._asdict()
+def options_of_each(bodies: Sequence[Body], defaults: Given) -> dict[str, Options]:
+    """Name of each body -> its options; bonded ones take what suits their matter together."""
+    matter: dict[int, list[Material]] = {}
+    groups = groups_of(bodies)
+    for body, group in zip(bodies, groups, strict=True):
+        matter.setdefault(group, []).append(body.material)
+    return {body.name: options_of(body, matter[group], defaults) for body, group in zip(bodies, groups, strict=True)}
+
+
+def options_of(body: Body, matter: Sequence[Material], defaults: Given) -> Options:
+    """The options of a body: its own, for those that are None the simulation's, then what suits ``matter``."""
+    found: dict[str, Any] = suited(matter)._asdict()
     for given in (defaults._asdict(), {name: getattr(body, name) for name in Options._fields}):
         found |= {name: value for name, value in given.items() if value is not None}
     return Options(**found)

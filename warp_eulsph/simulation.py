@@ -51,8 +51,8 @@ class Simulation(Looks):
             arrangement, scheme, weight and dilation are those of bodies that have none of their own; the step is one.
         arrangement: which bodies a refresh reads anew from their positions: Convected() those that flow, Current() all.
         scheme: Verlet options, or those of the paper's LaxWendroff or one-step Lax. Where this, weight and dilation are
-            None, each body takes what suits its matter (``defaults.py``): Verlet(), CubicSpline() and 1.3, or those of
-            liquids.
+            None, each body takes what suits its matter, bonded ones theirs together (``defaults.py``): Verlet(),
+            CubicSpline() and 1.3, what yields Verlet(dissipation=Upwind(stress=True)), liquids their own.
         time_step: TimeStep options.
         weight: SPH weight.
         dilation: smoothing length over spacing.

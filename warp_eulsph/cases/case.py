@@ -157,7 +157,7 @@ class Case(Problem):
             for plane in table.mirror:
                 depth = plane.depth
                 if depth is None:
-                    own = options_of(body, defaults)
+                    own = options_of(body, [body.material], defaults)
                     depth = 3.0 * own.weight.support * own.dilation * float(body.spacing.max())
                 body, condition = mirror(
                     body, point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()

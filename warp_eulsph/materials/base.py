@@ -221,6 +221,8 @@ class Material(ABC):
     forgets: ClassVar[bool] = False
     #: At rest it has no pressure, and in motion little of ρ c²: what the defaults of liquids are for.
     liquid: ClassVar[bool] = False
+    #: Beyond a yield stress it flows, and stress no longer grows with strain: what the defaults of metals are for.
+    yields: ClassVar[bool] = False
     #: P is linear in F − I: for small strains and rotations only, because a rotation then causes stress.
     linear: ClassVar[bool] = False
 

@@ -3,6 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import warp as wp
 
@@ -52,6 +53,7 @@ class DruckerPrager(Isotropic):
     cohesion: float = 0.0
     dilation: float = 0.0
     tension: float | None = None
+    yields: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

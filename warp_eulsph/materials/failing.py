@@ -49,6 +49,7 @@ class Failing(Material):
             )
         positive("layers", self.layers, "1")
         object.__setattr__(self, "density", self.material.density)
+        object.__setattr__(self, "yields", self.material.yields)  # of the class in other laws
         names = {variable.name for variable in self.material.law(Space(3)).history}
         if self.failure.needs is not None and self.failure.needs not in names:
             raise ValueError(

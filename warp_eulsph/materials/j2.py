@@ -3,7 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
@@ -37,6 +37,7 @@ class J2(Isotropic):
     """
 
     hardening: Hardening
+    yields: ClassVar[bool] = True
 
     def constants(self) -> dict[str, Any]:
         mu, kappa = lame_constants(self.young, self.poisson)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..body import Body
-from ..building import Options, options_of
+from ..building import Options, options_of_each
 from .describer import Describer
 from .recorded import Recorded, RecordedSolids, RecordedTransport, solids, transport
 
@@ -55,6 +55,8 @@ def _solids(simulation: RecordedSolids) -> dict[str, Any]:
         str(i): {**plain(interaction), "particles": plain(bound.indices)}
         for i, (interaction, bound) in enumerate(exchanges)
     }
+    options = options_of_each(simulation.bodies, simulation.options)
+    first = options[simulation.bodies[0].name]
     return {
         **({"interactions": interactions} if interactions else {}),
         "scheme": plain(stepper.options),
@@ -63,7 +65,7 @@ def _solids(simulation: RecordedSolids) -> dict[str, Any]:
         "time_step": plain(simulation.clock.option),
         "dilation": simulation.dilation,
         "sort": simulation.sorting.on,
-        "bodies": {body.name: _body(body, simulation) for body in simulation.bodies},
+        "bodies": {body.name: _body(body, options[body.name], first) for body in simulation.bodies},
         "boundaries": {
             str(i): {**plain(boundary), "particles": plain(condition.indices)}
             for i, (boundary, condition) in enumerate(conditions)
@@ -71,13 +73,12 @@ def _solids(simulation: RecordedSolids) -> dict[str, Any]:
     }
 
 
-def _body(body: Body, simulation: RecordedSolids) -> dict[str, Any]:
+def _body(body: Body, own: Options, first: Options) -> dict[str, Any]:
     """A body, with those options that it has of its own or that its matter is given otherwise than the first one's."""
     described: dict[str, Any] = plain(body)
-    first, own = (options_of(each, simulation.options)._asdict() for each in (simulation.bodies[0], body))
     for name in ("scheme", "weight", "dilation"):
-        if getattr(body, name) is None and own[name] != first[name]:
-            described[name] = plain(own[name])
+        if getattr(body, name) is None and getattr(own, name) != getattr(first, name):
+            described[name] = plain(getattr(own, name))
     return {name: value for name, value in described.items() if name not in SELDOM or value is not None}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from ..boundaries import Boundary
-from ..building import options_of
+from ..building import options_of_each
 from ..diagnostics import BodySums, SectionForce
 from ..interactions import BoundRigidBody
 from ..schedule import EverySteps, Schedule
@@ -247,7 +247,7 @@ def _part(probe: Probe, simulation: RecordedSolids, name: str | None) -> Part:
 
 def _shape_functions(simulation: RecordedSolids, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
-    options = options_of(body, simulation.options)
+    options = options_of_each(simulation.bodies, simulation.options)[body.name]
     functions = shape_functions(X[None, :], body.x, body.volume, options.dilation * body.spacing, options.weight)
     if not functions.inside[0]:
         raise ValueError(

@@ -26,7 +26,7 @@ class Upwind:
         sensor: where it sees oscillations, the jump is not reconstructed (first-order upwind); None never does that.
         stress: whether what the forces do to gradients goes through the stress, where the arrangement does not move:
             angular momentum is exact then, and smooth waves lose less: too little for the midpoint rule (M8), and for
-            shocks and waves that a few particles must carry.
+            shocks and waves that a few particles must carry. By default that of bodies that yield (``defaults.py``).
         volume: whether volume flows between pairs too, from high to low pressure (M24), in bodies that carry J alone:
             without it nothing holds pressures of neighbouring layers together, and they part in liquids at rest.
     """
