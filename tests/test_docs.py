@@ -32,7 +32,7 @@ def ids(path):
 
 
 def test_all_equations_are_defined():
-    assert {f"M{k}" for k in range(1, 29)} == EQUATIONS
+    assert {f"M{k}" for k in range(1, 30)} == EQUATIONS
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=ids)

@@ -54,6 +54,7 @@ from .scheme.lax import Lax
 from .scheme.lax_wendroff import LaxWendroff
 from .scheme.limiter import FluxCorrectedTransport
 from .scheme.pair_areas import PairAreas
+from .scheme.plain_volume import PlainVolume
 from .scheme.policy import Always, Every, Never, ReferencePolicy, WhenDistorted
 from .scheme.sensor import DimensionlessSensor, PaperSensor, Sensor
 from .scheme.sharpening import Sharpening
@@ -112,6 +113,7 @@ __all__ = [
     "NoSlip",
     "PairAreas",
     "PaperSensor",
+    "PlainVolume",
     "Pressure",
     "QuarticSpline",
     "QuinticSpline",

@@ -83,8 +83,9 @@ def mirror(
 
     Ghosts are ordinary particles. Those next to the plane need all of their own neighbours, and these theirs, so take
     ``depth`` = three support radii = 3 · weight.support · dilation · spacing; two are enough where the arrangement is
-    read anew, or dissipation switched off. Two planes: mirror the result again; ghosts of ghosts fill
-    the corner.
+    read anew, or dissipation switched off. They are flattened with what they copy, and what was further away at the
+    start has none: where matter flows take what may come near. Two planes: mirror the result again; ghosts of ghosts
+    fill the corner.
 
     Args:
         body: a ``Body`` in front of the plane.

@@ -334,9 +334,9 @@ class Medium:
 
     def predict(self, state: StateArrays, out: StateArrays, fraction: float) -> None:
         """``out``, which is S of ``state``, moved by ``fraction`` · Δt (M8)."""
-        arguments = [self.particles, self.of(state), self.smoothed_F_k, self.grad_v, self.forces, self.clock]
+        arguments = [self.smoothed_F_k, self.stabiliser.moving(self.grad_v), self.forces, self.clock, fraction]
         kernel = make_predict(self.space, self.configuration.fixed, self.moves_surfaces)
-        self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
+        self._launch(kernel, self.n, [self.particles, self.of(state), *arguments, self.of(out)])
 
     def kick(self, state: StateArrays) -> None:
         """v^{n+1} (M8)."""
@@ -345,9 +345,9 @@ class Medium:
 
     def drift(self, state: StateArrays, rates: StateArrays, fraction: float, out: StateArrays) -> None:
         """F and x of ``state`` moved by ``fraction`` · Δt with v of ``rates``, into ``out`` (M8)."""
-        arguments = [self.configuration.fields, self.of(state), self.of(rates).v, self.grad_v, self.clock]
+        arguments = [self.of(state), self.of(rates).v, self.stabiliser.moving(self.grad_v), self.clock, fraction]
         kernel = make_drift(self.space, self.configuration.fixed, self.moves_surfaces)
-        self._launch(kernel, self.n, [*arguments, fraction, self.of(out)])
+        self._launch(kernel, self.n, [self.configuration.fields, *arguments, self.of(out)])
 
     def limit(self, state: StateArrays) -> None:
         """U^{n+1} += d × diffusion (§5)."""

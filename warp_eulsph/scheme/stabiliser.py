@@ -79,8 +79,14 @@ class Stabiliser(ABC):
         """Gradients that are exact for linear fields from those of the reference, by which M9 and M24 reconstruct."""
         return gradient
 
+    def moving(self, gradient: wp.array) -> wp.array:
+        """The gradient by which F moves, from that of the reference."""
+        return gradient
+
     def turn(self, sums: Sums, clock: ClockArrays, fraction: float) -> None:
-        """Turn Q with the material, to where it is after ``fraction`` · Δt; where gradients are exact it has turned."""
+        """Make Q what M5 is to take: turned with the material, to where it is after ``fraction`` · Δt, where gradients
+        are not exact, by which it has turned.
+        """
         return
 
     def evolving(self) -> dict[str, wp.array]:

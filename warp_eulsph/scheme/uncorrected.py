@@ -43,7 +43,7 @@ class Uncorrected(Correction):
         if not flux.forgets:
             raise ValueError(
                 "correction=Uncorrected() is for liquids and gases, whose F is J^(1/d) I, got a solid whose "
-                "arrangement is read anew; take Balance() there, or arrangement=Convected()"
+                "arrangement is read anew; take Balance() or PlainVolume() there, or arrangement=Convected()"
             )
         return UncorrectedForces(space, len(particles.mass), device)
 
@@ -57,6 +57,15 @@ def lattice_sum(weight: Weight, dim: int, h: float) -> float:
     slope = weight.profile(wp.float64)[1]
     g = np.array([float(slope(wp.float64(each))) if 0.0 < each < weight.support else 0.0 for each in q])
     return float((g * xi[:, 0] ** 2).sum() * weight.sigma[dim - 1] / h ** (dim + 2))
+
+
+def lattice_kappa(configuration: Configuration) -> np.ndarray:
+    """κ of each particle, (n,): the reciprocal of that sum; reads the device."""
+    particles = configuration.particles
+    ratio = particles.h.numpy().astype(float) / particles.spacing.numpy()
+    known, which = np.unique(ratio.round(6), return_inverse=True)
+    dim = configuration.space.dim
+    return np.array([1.0 / lattice_sum(configuration.weight, dim, float(each)) for each in known])[which]
 
 
 @functools.cache
@@ -135,18 +144,11 @@ class UncorrectedForces(UpwindForces):
         self._L: wp.array | None = None
         self.potentials = Potentials(space, SWEEPS, n, device)
 
-    def _weigh(self, configuration: Configuration) -> None:
-        particles, dim = configuration.particles, self.space.dim
-        ratio = particles.h.numpy().astype(float) / particles.spacing.numpy()
-        known, which = np.unique(ratio.round(6), return_inverse=True)
-        found = np.array([1.0 / lattice_sum(configuration.weight, dim, float(each)) for each in known])
-        self.kappa.assign(found[which])
-        self._L = configuration.fields.L
-
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Take L out of the new reference."""
         if self._L is None:
-            self._weigh(configuration)
+            self.kappa.assign(lattice_kappa(configuration))
+            self._L = configuration.fields.L
         self.potentials.find(configuration, state)
         self._launch(_make_replace(self.space), len(self.kappa), [self.kappa, self._L, self._of_pairs])
 

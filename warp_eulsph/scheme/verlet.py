@@ -29,9 +29,10 @@ class Verlet(Scheme):
 
     Args:
         dissipation: M9; None leaves zero-energy modes undamped.
-        correction: what makes arrangements stable that move with the reference: Balance() (M13), SurfaceVectors() (M10)
-            or PairAreas() (M11, M12); None is the plain dual form, which pairs up in tension. Not used where nothing
-            moves, where it is zero unless the bodies came with surface vectors.
+        correction: what makes arrangements stable that move with the reference: Balance() (M13), SurfaceVectors()
+            (M10), PairAreas() (M11, M12), or under pressure PlainVolume() (M29); None is the plain dual form, which
+            pairs up in tension. Not used where nothing moves, where it is zero unless the bodies came with surface
+            vectors.
         limiter: flux-corrected transport (paper §5), or None; d comes from its own sensor.
         shifting: what keeps moving arrangements even (M15), with Balance() or Uncorrected(); None shifts nothing.
         tie: what ties positions to F where the arrangement does not move (M16); None leaves hourglass modes free.
