@@ -276,3 +276,17 @@ def test_solids_thinner_than_the_liquid_reaches_are_told(layers, told, caplog):
     assert len(lines) == told
     if told:
         assert "'plate' is some 0.14" in lines[0] and "'water' reaches 0.155 m" in lines[0]
+
+
+def test_a_coat_is_as_thick_as_what_it_is_bonded_to(caplog):
+    x, volume = box((0.0, 0.0), (2.0, 0.4), 0.05)
+    pool = es.Body(x=x, volume=volume, material=WATER, spacing=0.05, name="water")
+    rubber = es.NeoHookean(density=1000.0, young=1e6, poisson=0.3)
+    x, volume = box((0.0, -0.1), (2.0, 0.0), 0.05)
+    coat = es.Body(x=x, volume=volume, material=rubber, spacing=0.05, name="coat")
+    x, volume = box((0.0, -0.4), (2.0, -0.1), 0.05)
+    base = es.Body(x=x, volume=volume, material=rubber, spacing=0.05, name="base", bonded="coat")
+    for solids, told in (([coat], True), ([coat, base], False)):
+        caplog.clear()
+        es.Simulation([*solids, pool], interactions=[es.Contact()])
+        assert any("thick" in record.getMessage() for record in caplog.records) == told

@@ -25,6 +25,9 @@ def tell_thin(
 ) -> None:
     """Warn of bodies in the sums of a liquid (M28) whose mean thickness, 2 V/A, is less than its weight reaches.
 
+    Bonded ones are one: a thin coat of something thick is not thin. 2 V/A of a block is less than its shortest side,
+    that of a cube a third of it.
+
     Args:
         world: at its start.
         assembly: what the contact was bound with. skin: of its bodies.
@@ -33,25 +36,30 @@ def tell_thin(
     """
     by_number, area = assembly.order.by_number, np.zeros(len(assembly.X))
     area[skin.indices] = np.where(skin.there.numpy() == 1, skin.area.numpy(), 0.0)
-    V0, spacing, h = (
-        by_number(array.numpy()) for array in (world.particles.V0, world.particles.spacing, world.particles.h)
+    particles = world.particles
+    V0, spacing, h, group = (
+        by_number(array.numpy()) for array in (particles.V0, particles.spacing, particles.h, particles.group)
     )
     for wetting in wettings:
         liquid = np.arange(wetting.medium.span.start, wetting.medium.span.stop)
         dx, support = float(spacing[liquid].max()), wetting.medium.configuration.weight.support
         reach = support * float(h[liquid].max()) - 0.5 * dx  # from the surface: the liquid's outermost lie before it
         names = [name for name, own in assembly.bodies.items() if own.start in wetting.medium.span]
+        bonded: dict[int, list[str]] = {}
         for name, own in assembly.bodies.items():
-            faces = area[own.start : own.stop].sum()
-            if faces == 0.0 or own.start in wetting.medium.span or not any((each, name) in touching for each in names):
+            if own.start not in wetting.medium.span and any((each, name) in touching for each in names):
+                bonded.setdefault(int(group[own.start]), []).append(name)
+        for solids in bonded.values():
+            numbers = np.concatenate([assembly.bodies[name] for name in solids])
+            if (faces := area[numbers].sum()) == 0.0:
                 continue
-            thick = 2.0 * float(V0[own.start : own.stop].sum() / faces)
+            thick = 2.0 * float(V0[numbers].sum() / faces)
             if thick < reach:
                 log.warning(
-                    "Contact: %r is some %.3g m thick, and the weight of %s reaches %.3g m into it: the liquid feels "
-                    "what is behind, and may pass; its spacing should be %.3g m or less, is %.3g m. Make it finer, or "
-                    "give it weight=CubicSpline(), dilation=1.3, which reaches 2.6 spacings",
-                    name,
+                    "Contact: %s is some %.3g m thick (2 V/A), and the weight of %s reaches %.3g m into it: the liquid "
+                    "feels what is behind, and may pass; its spacing should be %.3g m or less, is %.3g m. Make it "
+                    "finer, or give it weight=CubicSpline(), dilation=1.3, which reaches 2.6 spacings",
+                    " with ".join(map(repr, solids)),
                     thick,
                     ", ".join(map(repr, names)),
                     reach,
