@@ -11,6 +11,10 @@ from ..linalg import reciprocal_power
 from .base import positive
 from .fluid import Equation, Fluid
 
+# |J − 1| below which the energy is a series: differences of powers would leave float32 a sixth of it at 5e-4. Its terms
+# fall by (γ + k)/50(k + 2), so that what follows this many is below the round-off of float64, for γ up to 17.
+NEAR, TERMS = 0.02, 12
+
 
 @dataclass(frozen=True, kw_only=True)
 class TaitLiquid(Fluid):
@@ -50,8 +54,15 @@ class TaitLiquid(Fluid):
 
         @wp.func
         def energy(J: real, theta: real, c: Constants) -> real:
+            x = J - real(1.0)
+            if wp.abs(x) < real(NEAR):
+                series = real(1.0)
+                for left in range(TERMS):
+                    k = real(TERMS - left)
+                    series = real(1.0) - (c.gamma + k) / (k + real(2.0)) * x * series
+                return real(0.5) * c.B * c.gamma * x * x * series
             compression = (power(J, c.gamma - real(1.0)) - real(1.0)) / (c.gamma - real(1.0))
-            return c.B * (compression + J - real(1.0))
+            return c.B * (compression + x)
 
         @wp.func
         def modulus(J: real, theta: real, c: Constants) -> real:
