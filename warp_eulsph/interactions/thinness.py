@@ -34,6 +34,8 @@ def tell_thin(
         touching: names of two bodies that touch each other, both ways round.
         wettings: solids in the sums of liquids.
     """
+    if not wettings:
+        return
     by_number, area = assembly.order.by_number, np.zeros(len(assembly.X))
     area[skin.indices] = np.where(skin.there.numpy() == 1, skin.area.numpy(), 0.0)
     particles = world.particles
