@@ -19,6 +19,7 @@ STALLED = 1e-6
 # Share of the most energy there ever was that the steps themselves may make. Verlet's wobble is 1e-5 of it, and the
 # midpoint rule at twice its step fails within a few steps once it made a tenth; what follows is worth nothing.
 MADE = 0.5
+REMEDY = "try a smaller cfl, a finer resolution or a limiter"
 # Steps before that is asked: loads on a body at rest have done no work yet.
 SETTLING = 100
 
@@ -69,33 +70,53 @@ class Failing(Protocol):
 def failure(simulation: Failing) -> UnstableError | None:
     """What is wrong with the present state of a ``Simulation``, None while all is well; reads the device."""
     place, dt = simulation.clock.bad, simulation.clock.free_dt
-    remedy = "try a smaller cfl, a finer resolution or a limiter"
+    remedy = REMEDY
     if place is not None:
         particle = int(simulation.order.ids.numpy()[place])
-        x, v, F = simulation.x[particle], simulation.v[particle], simulation.F[particle]
-        if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
-            what = f"det F = {np.linalg.det(F):.4g}, must be positive"
-            if np.linalg.det(F) > 0.0:
-                what = f"no state that its material allows, {_history(simulation, particle)}, F = {F.tolist()}"
-        else:
-            what = f"non-finite values, v = {v}, F = {F.tolist()}"
+        what = unphysical(simulation, particle)
     elif dt < STALLED * simulation.clock.longest_dt:
-        particle = _fastest(simulation)
+        particle = fastest(simulation)
         what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
-    elif simulation.steps > SETTLING and (made := simulation.stepper.ledger.made()) > MADE:
-        particle = _fastest(simulation)
+    elif simulation.steps > SETTLING and (made := float(simulation.stepper.ledger.made()[0])) > MADE:
+        particle = fastest(simulation)
         what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
-        remedy = f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
+        remedy = remedy_of_steps(simulation)
     else:
-        _look_for_failed(simulation)
-        return _look_for_tears(simulation)
+        return look_at_matter(simulation)
+    return unstable(simulation, particle, what, remedy, simulation.t, simulation.steps)
+
+
+def unphysical(simulation: Failing, particle: int) -> str:
+    """What is wrong with the state of a particle that is."""
+    x, v, F = simulation.x[particle], simulation.v[particle], simulation.F[particle]
+    if not (np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all()):
+        return f"non-finite values, v = {v}, F = {F.tolist()}"
+    if np.linalg.det(F) > 0.0:
+        return f"no state that its material allows, {_history(simulation, particle)}, F = {F.tolist()}"
+    return f"det F = {np.linalg.det(F):.4g}, must be positive"
+
+
+def remedy_of_steps(simulation: Failing) -> str:
+    """What to do where steps make energy."""
+    return f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
+
+
+def unstable(simulation: Failing, particle: int, what: str, remedy: str, time: float, step: int) -> UnstableError:
+    """The error of a run that ended at ``time`` [s] after ``step`` steps, for a particle that has ``what``."""
     return UnstableError(
-        f"unstable at t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
+        f"unstable at t = {time:.8g} s, step {step}: particle {particle} "
         f"{where(simulation, particle, simulation.x)} has {what}; {last_good(simulation.output)}; {remedy}",
         particle,
-        simulation.t,
-        simulation.steps,
+        time,
+        step,
     )
+
+
+def look_at_matter(simulation: Failing) -> UnstableError | None:
+    """Note and log, once each, the first matter that failed by its law and the first tear; the latter where it ends
+    the run."""
+    _look_for_failed(simulation)
+    return _look_for_tears(simulation)
 
 
 def _look_for_tears(simulation: Failing) -> UnstableError | None:
@@ -165,6 +186,8 @@ def _history(simulation: Failing, particle: int) -> str:
     return ", ".join(f"{name} = {simulation.history(name)[particle].tolist()}" for name in sorted(names))
 
 
-def _fastest(simulation: Failing) -> int:
+def fastest(simulation: Failing, among: range | None = None) -> int:
+    """The particle with the highest wave speed, ``among`` these or all."""
     speeds = [medium.flux.fields.speed.numpy() for medium in simulation.stepper.media]
-    return int(simulation.order.by_number(np.concatenate(speeds)).argmax())
+    by_number = simulation.order.by_number(np.concatenate(speeds))
+    return int(by_number.argmax()) if among is None else among.start + int(by_number[among].argmax())

@@ -11,11 +11,16 @@ from ..space import Space
 
 @functools.cache
 def moved_surface(space: Space) -> wp.Function:
-    """``wp.func`` Nanson's rule: the area vector s moved from F to F_new, cof(F_new F⁻¹) s, without the inverse."""
-    vec, mat, determinant, cof = space.vec, space.mat, det(space), cofactor(space)
+    """``wp.func`` Nanson's rule: the area vector s moved from F to F_new, cof(F_new F⁻¹) s, without the inverse.
+
+    In no time, ``tau`` = 0, it is s to the last bit.
+    """
+    real, vec, mat, determinant, cof = space.real, space.vec, space.mat, det(space), cofactor(space)
 
     @wp.func
-    def moved_surface(s: vec, F: mat, F_new: mat) -> vec:
+    def moved_surface(s: vec, F: mat, F_new: mat, tau: real) -> vec:
+        if tau == real(0.0):
+            return s
         return cof(F_new) @ (wp.transpose(F) @ s) / determinant(F)
 
     return moved_surface
@@ -41,7 +46,7 @@ def make_predict(space: Space, fixed: bool, surfaces: bool) -> wp.Kernel:
         half: State,
     ):
         a = first + wp.tid()
-        tau = real(fraction * clock.dt[0])
+        tau = real(fraction * clock.dt[clock.run[a]])
         force = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a] + forces.external[a]
         half.v[a] = half.v[a] + force * (tau / particles.mass[a])
         dF = grad_v[a] * tau
@@ -50,7 +55,7 @@ def make_predict(space: Space, fixed: bool, surfaces: bool) -> wp.Kernel:
         half.F[a] = half.F[a] + dF
         half.x[a] = state.x[a] + state.v[a] * tau
         if wp.static(surfaces):
-            half.surface[a] = moved(state.surface[a], state.F[a], state.F[a] + dF)
+            half.surface[a] = moved(state.surface[a], state.F[a], state.F[a] + dF, tau)
 
     return predict
 
@@ -91,7 +96,7 @@ def make_kick(space: Space) -> wp.Kernel:
     def kick(first: int, particles: Particles, forces: Forces, clock: Clock, v: wp.array(dtype=vec)):
         a = first + wp.tid()
         force = forces.internal[a] + forces.correction[a] + forces.tie[a] + forces.dissipation[a] + forces.external[a]
-        v[a] = v[a] + force * (real(clock.dt[0]) / particles.mass[a])
+        v[a] = v[a] + force * (real(clock.dt[clock.run[a]]) / particles.mass[a])
 
     return kick
 
@@ -115,13 +120,13 @@ def make_drift(space: Space, fixed: bool, surfaces: bool) -> wp.Kernel:
         out: State,
     ):
         a = first + wp.tid()
-        tau = real(fraction * clock.dt[0])
+        tau = real(fraction * clock.dt[clock.run[a]])
         dF = grad_v[a] * tau
         if wp.static(not fixed):
             dF = dF @ reference.F[a]
         F_new = state.F[a] + dF
         if wp.static(surfaces):
-            out.surface[a] = moved(state.surface[a], state.F[a], F_new)
+            out.surface[a] = moved(state.surface[a], state.F[a], F_new, tau)
         out.F[a] = F_new
         out.x[a] = state.x[a] + v[a] * tau
 
