@@ -46,6 +46,7 @@ SOURCES: dict[str, Callable[[Any], wp.array | np.ndarray]] = {
     "h": lambda simulation: simulation.particles.h,
     "X": lambda simulation: simulation.X,
     "force": lambda simulation: simulation.force,
+    "run_time": lambda simulation: np.repeat(simulation.runs.t, simulation.clock.sizes),
     "interaction_force": lambda simulation: simulation.interaction_force,
     "energy_density": lambda simulation: simulation.strain_energy_density,
     "mismatch": lambda simulation: simulation.mismatch,
@@ -110,6 +111,13 @@ FIELDS = {
     ),
     "mismatch": SnapshotField(
         lambda d: (), "-", "how far positions and F disagree, in spacings (M16)", ("mismatch",), default=False
+    ),
+    "run_time": SnapshotField(
+        lambda d: (),
+        "s",
+        "time that the run of the particle has reached, less than the frame's where it failed",
+        ("run_time",),
+        default=False,
     ),
     "interaction_force": SnapshotField(
         lambda d: (d,),
