@@ -77,7 +77,7 @@ def failure(simulation: Failing) -> UnstableError | None:
     elif dt < STALLED * simulation.clock.longest_dt:
         particle = fastest(simulation)
         what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
-    elif simulation.steps > SETTLING and (made := float(simulation.stepper.ledger.made()[0])) > MADE:
+    elif simulation.steps > SETTLING and (made := simulation.stepper.ledger.made()) > MADE:
         particle = fastest(simulation)
         what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
         remedy = remedy_of_steps(simulation)

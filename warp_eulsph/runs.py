@@ -127,7 +127,7 @@ class Runs:
         clock, simulation = self._clock, self._simulation
         bad, t, steps = clock.fields.bad.numpy().copy(), self.t, self.steps
         free_dt, longest = clock.fields.free_dt.numpy(), clock.fields.longest_dt.numpy()
-        made = np.where(steps > SETTLING, simulation.stepper.ledger.made(), 0.0)
+        made = np.where(steps > SETTLING, simulation.stepper.ledger.made_by_runs(), 0.0)
         error = None
         for r in np.flatnonzero(
             (bad >= 0) & ((bad != WELL) | (free_dt < STALLED * longest) | ~(made <= MADE))

@@ -84,6 +84,13 @@ FIELDS = {
         lambda x, h, J: h * np.clip(J ** (1.0 / x.shape[1]), LEAST_GROWTH, LARGEST_GROWTH),
     ),
     "particle": SnapshotField(lambda d: (), "-", "number of the particle in the simulation", ("particle",)),
+    "run_time": SnapshotField(
+        lambda d: (),
+        "s",
+        "time that the run of the particle has reached, less than the frame's where it failed",
+        ("run_time",),
+        default=False,
+    ),
     "displacement": SnapshotField(
         lambda d: (d,), "m", "displacement since the start", ("x", "X"), lambda x, X: x - X, default=False
     ),
@@ -111,13 +118,6 @@ FIELDS = {
     ),
     "mismatch": SnapshotField(
         lambda d: (), "-", "how far positions and F disagree, in spacings (M16)", ("mismatch",), default=False
-    ),
-    "run_time": SnapshotField(
-        lambda d: (),
-        "s",
-        "time that the run of the particle has reached, less than the frame's where it failed",
-        ("run_time",),
-        default=False,
     ),
     "interaction_force": SnapshotField(
         lambda d: (d,),

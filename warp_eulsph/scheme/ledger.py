@@ -30,6 +30,8 @@ ACCOUNTS = (
     "stepping",
     "shifting",
 )
+#: Those by which energy comes in.
+PUT_IN = ("external", "constraint", "limiter")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
@@ -222,7 +224,8 @@ class Ledger:
         self._pages = [_Page(medium, clock, *arrays, self._total) for medium in media]
         self._energy = wp.zeros(runs, dtype=wp.float64, device=device)
         self._sum = sum_of(wp.float64, clock.sizes, device)
-        self._start, self._most = wp.zeros(runs, dtype=wp.float64, device=device), np.zeros(runs)
+        self._starts = wp.zeros(runs, dtype=wp.float64, device=device)
+        self._start, self._most = 0.0, np.zeros(runs)
         self._exchanges, self._damped = exchanges, damped
 
     def open(self, U: StateArrays) -> None:
@@ -233,13 +236,15 @@ class Ledger:
         self._total.zero_()
         if self._exchanges is not None:
             self._exchanges.open()
-        self._start.assign(self.kinetic_of_runs(U) + self.stored_of_runs(U) + self.held())
+        starts = self.kinetic_of_runs(U) + self.stored_of_runs(U) + self.held()
+        self._starts.assign(starts)
+        self._start = float(starts[0])
 
     def evolving(self) -> dict[str, wp.array]:
         """The accounts and the end of the last step booked, by name; with ``start`` what a checkpoint must hold."""
         held = {"Ledger.total": self._total, "Ledger.v_old": self.v_old, "Ledger.W_old": self._W_old}
         if self.clock.independent:
-            held["Ledger.start"] = self._start
+            held["Ledger.start"] = self._starts
         return held if self._exchanges is None else held | self._exchanges.evolving()
 
     def open_limiter(self, U: StateArrays) -> None:
@@ -294,15 +299,15 @@ class Ledger:
     @property
     def start(self) -> float:
         """Energy at the start [J]; may be set where there is one clock."""
-        return self.clock.total(self._start.numpy())
+        return float(self.clock.total(self._starts.numpy())) if self.clock.independent else self._start
 
     @start.setter
     def start(self, energy: float) -> None:
-        self._start.fill_(energy)
+        self._start = energy
 
     def kinetic(self, U: StateArrays) -> float:
         """Kinetic energy [J]; reads the device."""
-        return self.clock.total(self.kinetic_of_runs(U))
+        return float(self.clock.total(self.kinetic_of_runs(U)))
 
     def kinetic_of_runs(self, U: StateArrays) -> np.ndarray:
         """Kinetic energy [J] of each run, (runs,); reads the device."""
@@ -321,7 +326,7 @@ class Ledger:
 
     def stored(self, U: StateArrays) -> float:
         """Stored energy [J]; reads the device."""
-        return self.clock.total(self.stored_of_runs(U))
+        return float(self.clock.total(self.stored_of_runs(U)))
 
     def stored_of_runs(self, U: StateArrays) -> np.ndarray:
         """Stored energy [J] of each run, (runs,); reads the device."""
@@ -340,7 +345,7 @@ class Ledger:
 
     def accounts(self) -> dict[str, float]:
         """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
-        found = {name: self.clock.total(added) for name, added in self.accounts_of_runs().items()}
+        found = dict(zip(ACCOUNTS, self.clock.total(self._total.numpy()).tolist(), strict=True))
         if self._exchanges is not None:
             found["external"] += self._exchanges.supplied()
             found["interaction"] = sum(self.exchanged())
@@ -352,16 +357,19 @@ class Ledger:
 
     def start_of_runs(self) -> np.ndarray:
         """Energy of each run at the start [J], (runs,); reads the device."""
-        return self._start.numpy().copy()
+        return self._starts.numpy().copy() if self.clock.independent else np.array([self._start])
 
-    def made(self) -> np.ndarray:
-        """Energy that the steps of each run made themselves, over the most that was put in at any look, (runs,); reads
-        the device."""
+    def made(self) -> float:
+        """Energy that steps by the only clock made, over the most that was put in at any look; reads the device."""
+        accounts = self.accounts()
+        put_in = abs(self._start) + sum(max(accounts[name], 0.0) for name in PUT_IN)
+        most = self._most[0] = max(self._most[0], put_in)
+        return max(accounts["stepping"], 0.0) / most if most > 0.0 else 0.0
+
+    def made_by_runs(self) -> np.ndarray:
+        """Energy that the steps of each run made, over the most that was put in, (runs,); reads the device."""
         accounts = self.accounts_of_runs()
-        if self._exchanges is not None:
-            accounts["external"] += self._exchanges.supplied()
-        put_in = np.abs(self.start_of_runs())
-        put_in += sum(np.maximum(accounts[name], 0.0) for name in ("external", "constraint", "limiter"))
+        put_in = np.abs(self.start_of_runs()) + sum(np.maximum(accounts[name], 0.0) for name in PUT_IN)
         self._most = np.fmax(self._most, put_in)
         made = np.maximum(accounts["stepping"], 0.0)
         return np.divide(made, self._most, out=np.zeros_like(made), where=self._most > 0.0)

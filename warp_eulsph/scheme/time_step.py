@@ -239,15 +239,19 @@ class DeviceClock:
         well: np.ndarray = self.fields.bad.numpy() == WELL
         return well if self.independent else np.ones(1, dtype=bool)
 
-    def total(self, values: np.ndarray) -> float:
-        """Sum of ``values``, (runs,), over those that are well; reads the device."""
-        return float(values[self.well].sum() if self.independent else values[0])
+    def total(self, values: np.ndarray) -> np.ndarray:
+        """Sum of ``values``, (runs, …), over the runs that are well; reads the device."""
+        found: np.ndarray = values[self.well].sum(axis=0) if self.independent else values[0]
+        return found
 
     @property
     def t(self) -> float:
         """Time [s] that all runs have reached which have not failed, the last one that did if none is left; reads the
         device."""
-        t, well = self.fields.t.numpy(), self.well
+        t = self.fields.t.numpy()
+        if not self.independent:
+            return float(t[0])
+        well = self.well
         return float(t[well].min() if well.any() else t.max())
 
     @property
