@@ -6,12 +6,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from .body import Body
-from .order import Order
 from .scheme.arrangement import Arrangement
 from .scheme.health import WELL, UnstableError, last_good
-from .scheme.stepper import Stepper
 from .scheme.time_step import DeviceClock
-from .worst import worst_of
+from .worst import Bad, worst_of
 
 log = logging.getLogger(__name__)
 
@@ -24,7 +22,7 @@ MADE = 0.5
 SETTLING = 100
 
 
-class Failing(Protocol):
+class Failing(Bad, Protocol):
     """What is asked of a simulation.
 
     Attributes:
@@ -33,9 +31,7 @@ class Failing(Protocol):
         broken: words on the first particle that failed by its law.
     """
 
-    stepper: Stepper
     clock: DeviceClock
-    order: Order
     bodies: list[Body]
     ranges: dict[str, range]
     arrangement: Arrangement
@@ -50,22 +46,6 @@ class Failing(Protocol):
     @property
     def steps(self) -> int:
         """Steps taken."""
-
-    @property
-    def X(self) -> np.ndarray:
-        """Initial positions [m], (n, dim)."""
-
-    @property
-    def x(self) -> np.ndarray:
-        """Positions [m], (n, dim)."""
-
-    @property
-    def v(self) -> np.ndarray:
-        """Velocities [m/s], (n, dim)."""
-
-    @property
-    def F(self) -> np.ndarray:
-        """Deformation gradients, (n, dim, dim)."""
 
     def history(self, name: str) -> np.ndarray:
         """What materials remember under this name, by number."""
@@ -104,7 +84,7 @@ def failure(simulation: Failing) -> UnstableError | None:
 
 def _worst(simulation: Failing, place: int) -> tuple[int, str]:
     """The particle that is named, and words on what it has and how many are bad."""
-    particle, J, finite, count = worst_of(simulation, place)
+    particle, J, finite, bad = worst_of(simulation, place)
     F = f"F = {simulation.F[particle].tolist()}"
     if J <= 0.0 and body_of(simulation, particle).material.forgets:  # which made 0 of whatever J was
         what = "no volume left, its J = det F went from positive to zero or below in this step"
@@ -115,10 +95,10 @@ def _worst(simulation: Failing, place: int) -> tuple[int, str]:
     else:
         what = f"non-finite values, v = {simulation.v[particle]}, {F}"
     n = len(simulation.order.places)
-    if count == n > 1:
+    if bad == n > 1:
         what += f"; all {n} particles are bad, as when steps are too long or units do not fit"
-    elif count > 1:
-        what += f"; {count} of {n} particles are bad"
+    elif bad > 1:
+        what += f"; {bad} of {n} particles are bad"
     return particle, what
 
 

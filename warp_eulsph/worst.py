@@ -32,17 +32,19 @@ class Bad(Protocol):
 
 
 class Worst(NamedTuple):
-    """A bad particle, by number, and how many there are.
+    """A bad particle.
 
     Attributes:
+        particle: its number.
         J: its det F, not a number where F is not finite.
         finite: x, v and F are, so that with J > 0 its law is what refused the state.
+        bad: how many are bad.
     """
 
     particle: int
     J: float
     finite: bool
-    count: int
+    bad: int
 
 
 def worst_of(simulation: Bad, place: int) -> Worst:
