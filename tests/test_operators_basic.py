@@ -194,6 +194,27 @@ def test_rows_in_slices_lie_interleaved():
     assert len(set(places)) == lists.pairs  # no two pairs at one place
 
 
+def test_rows_are_the_same_whether_they_were_kept_or_not():
+    """Kept when they were counted, or searched for again where one is too long for that, in lists that grow or not."""
+    execution.set_simd(False)
+    x = cloud(2, 13, jitter=0.4)[0]
+    crowd, rng = 3.0 * x, np.random.default_rng(12)
+    crowd[:60] = rng.uniform(0.0, 0.01, (60, 2))
+    lists, kept, grown = lists_of(x, 0.1, real=wp.float32), [], []
+    for places in (x, x, crowd, 0.6 * x, 0.6 * x):
+        there = lists.capacity
+        positions = wp.array(places, dtype=lists.space.vec)
+        lists.count_neighbours(positions)
+        lists.sum_counts()
+        lists.make_room()
+        lists.fill(positions)
+        assert pairs_of(lists.rows) == tree_pairs(positions.numpy().astype(float), 0.2)
+        kept.append(bool(lists.grid.room >= lists.lengths.max()))
+        grown.append(lists.capacity > there)
+    assert kept == [False, True, False, False, True]
+    assert grown == [True, False, False, True, False]
+
+
 @pytest.mark.parametrize("dim", [1, 2, 3])
 @pytest.mark.parametrize("open_axis", [False, True])
 def test_neighbours_in_a_periodic_box(dim, open_axis):

@@ -20,7 +20,7 @@ _SNIPPET = """
 @functools.cache
 def raise_to(real: type) -> wp.Function:
     """``wp.func`` (target, value): target[0] ← max(target[0], value); NaN changes nothing."""
-    name = "double" if real is wp.float64 else "float"
+    name = {wp.float64: "double", wp.float32: "float", wp.int32: "int"}[real]
 
     @wp.func_native(_SNIPPET.format(name="max", type=name, better=">", place="target.data"))
     def raise_to(target: wp.array(dtype=real), value: real): ...

@@ -109,6 +109,12 @@ def repeated(one: wp.array, n: int) -> wp.array:
     return wp.array(ptr=one.ptr, shape=(n,), strides=(0,), dtype=one.dtype, device=one.device)
 
 
+def integers_of(array: wp.array) -> wp.array:
+    """The memory of an array as one of int32: scratch, while nobody needs what is in it."""
+    size = len(array) * wp.types.type_size_in_bytes(array.dtype) // 4
+    return wp.array(ptr=array.ptr, shape=size, dtype=wp.int32, device=array.device)
+
+
 def arrays(fields: Any, group: str) -> dict[str, wp.array]:
     """The arrays of an instance of a group's struct by name: ``State.x`` and so on."""
     return {f"{group}.{name}": getattr(fields, name) for name in GROUPS[group]}

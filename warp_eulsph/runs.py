@@ -11,7 +11,7 @@ from .body import Body, groups_of
 from .boundaries import Bound
 from .building import MediumPlan
 from .diagnostics import Diagnostics
-from .failure import MADE, REMEDY, SETTLING, STALLED, Failing, fastest, remedy_of_steps, unphysical, unstable
+from .failure import MADE, SETTLING, STALLED, Cause, Failing, found_bad, gained, stalled, unstable
 from .interactions import Interaction
 from .scheme.health import WELL, UnstableError
 from .scheme.policy import Always, Every, Never
@@ -132,19 +132,15 @@ class Runs:
         for r in np.flatnonzero(
             (bad >= 0) & ((bad != WELL) | (free_dt < STALLED * longest) | ~(made <= MADE))
         ).tolist():
-            remedy = REMEDY
             if bad[r] != WELL:
-                particle = int(simulation.order.ids.numpy()[bad[r]])
-                what = unphysical(simulation, particle)
+                cause = found_bad(simulation, int(bad[r]), self.ranges[r])
+            elif free_dt[r] < STALLED * longest[r]:
+                cause = stalled(simulation, float(free_dt[r]), self.ranges[r])
             else:
-                particle = fastest(simulation, self.ranges[r])
-                what = f"the highest wave speed, and the time step fell to {free_dt[r]:.3g} s"
-                if made[r] > MADE:
-                    what = f"the highest wave speed, and the steps have made {100.0 * made[r]:.3g} % of its energy"
-                    remedy = remedy_of_steps(simulation)
-            error = unstable(simulation, particle, what, remedy, float(t[r]), int(steps[r]))
+                cause = gained(simulation, float(made[r]), self.ranges[r])
+            error = unstable(simulation, cause, float(t[r]), int(steps[r]))
             self.failures[r] = error
-            bad[r] = -1 - particle
+            bad[r] = -1 - cause.particle
             log.warning("run %d of %d has ended: %s", r, len(self), error)
         if error is not None:
             clock.fields.bad.assign(bad)
@@ -155,12 +151,5 @@ class Runs:
         bad, t, steps = self._clock.fields.bad.numpy(), self.t, self.steps
         self.failures = [None] * len(self)
         for r in np.flatnonzero(bad < 0).tolist():
-            particle = int(-1 - bad[r])
-            self.failures[r] = unstable(
-                self._simulation,
-                particle,
-                "ended the run before this session",
-                "see its log",
-                float(t[r]),
-                int(steps[r]),
-            )
+            cause = Cause(int(-1 - bad[r]), "ended the run before this session", "see its log")
+            self.failures[r] = unstable(self._simulation, cause, float(t[r]), int(steps[r]))

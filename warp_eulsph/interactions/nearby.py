@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from ..execution import Launcher
-from ..operators.neighbours import QUERY_MARGIN
+from ..operators.grid_search import QUERY_MARGIN
 from ..space import Space
 from ..structs import ClockArrays, StateArrays
 from .faces import REACH, alike_vectors

@@ -10,7 +10,7 @@ from ..atomics import raise_to
 from ..boundaries import Assembly
 from ..execution import Launcher
 from ..fields import clock_structure, structure
-from ..operators.neighbours import QUERY_MARGIN, make_longest
+from ..operators.grid_search import QUERY_MARGIN, make_longest
 from ..reduce import Sum
 from ..space import Space
 from ..weights import Weight

@@ -9,6 +9,7 @@ import functools
 import warp as wp
 
 from ..execution import Launcher
+from ..fields import integers_of
 from ..simd import prelude
 from ..space import Space
 from .cell_search import MARGIN, make_search
@@ -232,10 +233,9 @@ class Cells:
         """
         if scratch is not self._scratch:
             self._launch.forget()  # launches with arrays that the lists have outgrown
-            size = len(scratch) * wp.types.type_size_in_bytes(self.space.real) // 4
-            self._scratch, self._room = scratch, wp.array(ptr=scratch.ptr, shape=size, dtype=int, device=self.device)
+            self._scratch, self._room = scratch, integers_of(scratch)
             # Rows inside a body are longer than the mean; rows that lie far apart would be slow to read
-            self._stride = min(size, len(scratch) * 5 // 4) // len(place)
+            self._stride = min(len(self._room), len(scratch) * 5 // 4) // len(place)
         arguments = [place, self.h, self.body, self.box, self.support, self._frame, self._sides]
         arguments += [self._begin, self._order, self._columns, count, start, index, self._room, self._stride]
         self._launch(make_search(self.space, fill), len(place), arguments)

@@ -7,19 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 import warp as wp
 
-from ..atomics import raise_to
 from ..execution import Launcher, simd
 from ..fields import neighbour_structure
-from ..space import Space, difference, vector_type
+from ..space import Space, vector_type
 from ..structs import NeighbourRows
 from ..weights import Weight
 from .cells import Cells
+from .grid_search import GridSearch, make_longest
 from .slices import SLICE, Slices, places_taken
 
 log = logging.getLogger(__name__)
 
-# Cell coordinates are rounded, distances are tested exactly: a query a little too wide misses nothing.
-QUERY_MARGIN = 1.001
 # Pairs are numbered by 32-bit integers.
 MOST_PAIRS = 2**31 - 1
 
@@ -42,89 +40,6 @@ def _make_pad(space: Space, first_component: int) -> wp.Kernel:
         out[a] = p
 
     return pad
-
-
-@functools.cache
-def _make_search(space: Space, fill: bool) -> wp.Kernel:
-    """Kernel: count a row's neighbours, or (``fill``) write them sorted by index."""
-    real, vec, dim = space.real, space.vec, space.dim
-    vec3 = wp.types.vector(length=3, dtype=real)
-    separation = difference(space)
-    images = 3 if space.periodic else 1
-    shifts_y, shifts_z = (images if dim > 1 else 1), (images if dim > 2 else 1)
-    lowest = -1 if space.periodic else 0
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def search(
-        first: int,
-        grid: wp.uint64,
-        padded: wp.array(dtype=vec3),
-        x: wp.array(dtype=vec),
-        h: wp.array(dtype=real),
-        body: wp.array(dtype=wp.int32),
-        box: vec,
-        support: real,
-        h_max: wp.array(dtype=real),
-        count: wp.array(dtype=wp.int32),
-        start: wp.array(dtype=wp.int32),
-        stride: int,
-        index: wp.array(dtype=wp.int32),
-    ):
-        a = first + wp.tid()
-        reach = support * real(0.5) * (h[a] + h_max[0]) * real(QUERY_MARGIN)
-        n = int(0)
-        row = int(0)
-        if wp.static(fill):
-            row = start[a]
-        # Dynamic bounds: unrolled, the 27 copies of the query in 3-D take 13 s to compile
-        images_x = int(wp.static(images))
-        images_y = int(wp.static(shifts_y))
-        images_z = int(wp.static(shifts_z))
-        for ix in range(images_x):
-            for iy in range(images_y):
-                for iz in range(images_z):
-                    p = padded[a]
-                    shift = wp.vec3i(ix + lowest, iy + lowest, iz + lowest)
-                    inside = bool(True)
-                    for i in range(wp.static(dim if space.periodic else 0)):
-                        if shift[i] != 0:
-                            p[i] = p[i] + box[i] * real(shift[i])
-                            inside = inside and box[i] > real(0.0) and p[i] > -reach and p[i] < box[i] + reach
-                    if inside:
-                        for b in wp.hash_grid_query(grid, p, reach, body[a]):
-                            if b != a and body[b] == body[a]:
-                                # The query returns whole cells: in a small box it meets b from several images
-                                nearest = bool(True)
-                                for i in range(wp.static(dim if space.periodic else 0)):
-                                    if box[i] > real(0.0):
-                                        away = wp.abs(padded[b][i] - p[i])
-                                        nearest = nearest and away < real(0.5) * box[i]
-                                r = wp.length(separation(x[b], x[a], box))
-                                if nearest and r < support * real(0.5) * (h[a] + h[b]):
-                                    if wp.static(fill):
-                                        k = row + n * stride
-                                        while k > row and index[k - stride] > b:
-                                            index[k] = index[k - stride]
-                                            k = k - stride
-                                        index[k] = b
-                                    n = n + 1
-        if wp.static(not fill):
-            count[a] = n
-
-    return search
-
-
-@functools.cache
-def make_longest(space: Space) -> wp.Kernel:
-    """Kernel: the largest smoothing length."""
-    real = space.real
-    raise_longest = raise_to(real)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def find_longest(first: int, h: wp.array(dtype=real), h_max: wp.array(dtype=real)):
-        raise_longest(h_max, h[first + wp.tid()])
-
-    return find_longest
 
 
 @functools.cache
@@ -182,31 +97,30 @@ class NeighbourLists:
         n = len(h)
         self.support, self._in_cells = weight.support, simd(device)
         self.cells: Cells | None = None
-        self.grid: wp.HashGrid | None = None
+        self.grid: GridSearch | None = None
+        self._h_max = wp.zeros(1, dtype=space.real, device=device)
+        self._slices = None if self._in_cells else Slices(n, device)
         self._equip()
         self.rows: NeighbourRows = neighbour_structure(space)()
         self.rows.box = self.box
         self.rows.start = wp.zeros(n + 1, dtype=wp.int32, device=device)
-        self._slices = None if self._in_cells else Slices(n, device)
         self.rows.stride = 1 if self._slices is None else SLICE
         self.rows.stop = self.rows.start[1:] if self._slices is None else wp.zeros(n, dtype=wp.int32, device=device)
         self._waiting = wp.zeros(1, dtype=wp.int32, device=device)
-        self._total, self._h_max = self.rows.start[n:], wp.zeros(1, dtype=space.real, device=device)
+        self._total = self.rows.start[n:]
         self._builds = 0
         self._reserve(0)
 
     def _equip(self) -> None:
         """Allocate what a search needs besides the lists."""
         n, space, device = len(self.h), self.space, self.device
-        if self._in_cells:
-            self.cells = Cells(space, self.support, self.h, self.body, self.box, device)
-        else:
-            side = int(np.clip(2 ** round(np.log2(max(n, 1)) / space.dim), 8, 256))
-            self.grid = wp.HashGrid(
-                side, side if space.dim > 1 else 1, side if space.dim > 2 else 1, device=device, dtype=space.real
-            )
         self.padded = wp.zeros(n, dtype=vector_type(3, space.real), device=device)
         self.count = wp.zeros(n + 1, dtype=wp.int32, device=device)
+        if self._slices is None:
+            self.cells = Cells(space, self.support, self.h, self.body, self.box, device)
+        else:
+            among = self.h, self._h_max, self.body, self.box
+            self.grid = GridSearch(space, self.support, *among, self.count, self._slices.longest, device)
 
     def release(self) -> None:
         """Free what a search needs besides the lists; the next search allocates it again."""
@@ -277,14 +191,15 @@ class NeighbourLists:
             self._launch(make_longest(self.space), n, [self.h, self._h_max])
         last = 3 - self.space.dim if self._in_cells else 0
         self._launch(_make_pad(self.space, last), n, [x, self.box, self.padded])
+        self._scratch = self.rows.w
         if self.cells is not None:
             self.cells.sort(self.padded)
+            self._search_cells(fill=False)
         elif self.grid is not None:
             if self._builds == 0:
                 self._measure()
-            self.grid.build(self.padded, self.support * self._longest * QUERY_MARGIN, groups=self.body)
-        self._scratch = self.rows.w
-        self._search(x, fill=False)
+            self.grid.sort(self.padded, self._longest)
+            self.grid.count(self.padded, x, self._scratch)
 
     def sum_counts(self) -> None:
         """Where each row begins and stops; may be repeated."""
@@ -325,7 +240,14 @@ class NeighbourLists:
 
     def fill(self, x: wp.array) -> None:
         """Write the rows, for which there is room."""
-        self._search(x, fill=True)
+        if self.grid is not None:
+            self.grid.fill(self.padded, x, self.rows)
+        else:
+            self._search_cells(fill=True)
+
+    def _search_cells(self, fill: bool) -> None:
+        assert self.cells is not None  # one or the other is made
+        self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, self._scratch, fill)
 
     def _measure(self) -> None:
         """Note the largest smoothing length of the last count; reads the device."""
@@ -338,12 +260,3 @@ class NeighbourLists:
                     f"periodic box length along axis {i} must be at least twice the support radius "
                     f"({2 * self.support * self._longest:.6g} m), got {length:.6g} m; enlarge the box or refine"
                 )
-
-    def _search(self, x: wp.array, fill: bool) -> None:
-        if self.cells is not None:
-            self.cells.search(self.padded, self.count, self.rows.start, self.rows.index, self._scratch, fill)
-            return
-        assert self.grid is not None  # one or the other is made
-        arguments = [self.grid.id, self.padded, x, self.h, self.body, self.box, self.support, self._h_max]
-        arguments += [self.count, self.rows.start, self.rows.stride, self.rows.index]
-        self._launch(_make_search(self.space, fill), len(x), arguments)
