@@ -116,7 +116,7 @@ def _remedies(simulation: Failing) -> tuple[str, str]:
 
 
 def look_at_matter(simulation: Failing) -> UnstableError | None:
-    """Note and log, once each, the first matter that failed by its law and the first tear; an error if that ends all."""
+    """Note and log, once each, the first matter that failed by its law and the first tear, an error if it ends all."""
     _look_for_failed(simulation)
     return _look_for_tears(simulation)
 

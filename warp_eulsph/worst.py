@@ -50,8 +50,9 @@ class Worst(NamedTuple):
 def worst_of(simulation: Bad, place: int, among: range) -> Worst:
     """The particle of the least det F that is not positive, the fastest of several; else the middle of what is lost.
 
-    It is ``among`` those of one run, and so is what is counted. What is not finite spreads by sums over neighbours, so the middle is of that where fewest particles have lost it: F,
-    v, x or what their law remembers. Where none of this is bad it is the one at ``place``, which was found bad.
+    What is not finite spreads by sums over neighbours, so the middle is of that where fewest particles have lost it: F,
+    v, x or what their law remembers. Where none of this is bad it is the one at ``place``, which was found bad. All
+    this is of the particles ``among`` which it is, those of one run.
     """
     x, v, F = simulation.x[among], simulation.v[among], simulation.F[among]
     lost = [~np.isfinite(values).reshape(len(x), -1).all(axis=1) for values in (F, v, x)]
