@@ -158,10 +158,12 @@ def _make_open(space: Space) -> wp.Kernel:
     Clock = clock_structure(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def open_batch(first: int, clock: Clock):
-        r = first + wp.tid()
-        if clock.bad[r] == WELL and clock.t[r] < clock.target[0]:
-            clock.running[0] = 1
+    def open_batch(clock: Clock):
+        clock.taken[0] = 0
+        clock.running[0] = 0
+        for r in range(clock.t.shape[0]):
+            if clock.bad[r] == WELL and clock.t[r] < clock.target[0]:
+                clock.running[0] = 1
 
     return open_batch
 
@@ -175,7 +177,7 @@ class DeviceClock:
         every: steps between refreshes of independent runs; 0 where there is one clock.
 
     Attributes:
-        fields: struct ``Clock``.
+        fields: struct ``Clock``. independent: whether each run has its own time and steps.
     """
 
     def __init__(
@@ -188,6 +190,7 @@ class DeviceClock:
         every: int = 0,
     ):
         self.space, self.option, self.device, self.sizes = space, option, device, tuple(sizes)
+        self.independent = every > 0
         self._launch = Launcher(device)
         self.cfl = cfl if option.cfl is None else option.cfl
         self.fields: ClockArrays = clock_structure(space)()
@@ -203,11 +206,6 @@ class DeviceClock:
         self.fields.first, self.fields.every = 0, every
         self._run = wp.array(np.repeat(np.arange(runs), sizes if every else 1), dtype=wp.int32, device=device)
         self.fields.run = self._run if every else repeated(self._run, sum(sizes))
-
-    @property
-    def independent(self) -> bool:
-        """Whether each run has its own time and steps."""
-        return self.fields.every > 0
 
     def runs_of(self, span: range) -> dict[int, range]:
         """Number of each run that has particles in ``span`` -> their numbers; a run of its own is not cut."""
@@ -276,9 +274,7 @@ class DeviceClock:
 
     def open_batch(self) -> None:
         """Begin a batch of recorded steps, of which none is taken once the target is reached or a particle is bad."""
-        self.fields.taken.zero_()
-        self.fields.running.zero_()
-        self._launch(_make_open(self.space), len(self.sizes), [self.fields])
+        self._launch.once(_make_open(self.space), 1, [self.fields])
 
     @property
     def taken(self) -> int:
