@@ -61,7 +61,7 @@ class Cause(NamedTuple):
 
 def failure(simulation: Failing) -> UnstableError | None:
     """What is wrong with a ``Simulation`` that has one clock, None while all is well; reads the device."""
-    place, dt, everyone = simulation.clock.bad, simulation.clock.free_dt, range(len(simulation.order.places))
+    place, dt, everyone = simulation.clock.bad, simulation.clock.free_dt, range(simulation.stepper.n)
     if place is not None:
         cause = found_bad(simulation, place, everyone)
     elif dt < STALLED * simulation.clock.longest_dt:

@@ -129,7 +129,7 @@ class Runs:
         free_dt, longest = clock.fields.free_dt.numpy(), clock.fields.longest_dt.numpy()
         made = np.where(steps > SETTLING, simulation.stepper.ledger.made_by_runs(), 0.0)
         error = None
-        ended = (bad != WELL) | (free_dt < STALLED * longest) | ~(made <= MADE)
+        ended = (bad != WELL) | (free_dt < STALLED * longest) | (made > MADE)
         for r in np.flatnonzero(ended & (bad >= 0)).tolist():
             if bad[r] != WELL:
                 cause = found_bad(simulation, int(bad[r]), self.ranges[r])

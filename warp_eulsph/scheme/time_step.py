@@ -242,6 +242,9 @@ class DeviceClock:
         found: np.ndarray = values[self.well].sum(axis=0) if self.independent else values[0]
         return found
 
+    def _largest(self, values: wp.array) -> float:
+        return float(values.numpy().max() if self.independent else values.numpy()[0])
+
     @property
     def t(self) -> float:
         """Time [s] that all runs have reached which have not failed, the last one that did if none is left; reads the
@@ -255,17 +258,17 @@ class DeviceClock:
     @property
     def dt(self) -> float:
         """Last time step [s], the longest of independent runs; reads the device."""
-        return float(self.fields.dt.numpy().max())
+        return self._largest(self.fields.dt)
 
     @property
     def free_dt(self) -> float:
         """Last time step [s] that no output time shortened; reads the device."""
-        return float(self.fields.free_dt.numpy().max())
+        return self._largest(self.fields.free_dt)
 
     @property
     def longest_dt(self) -> float:
         """Longest time step [s] so far that no output time shortened; reads the device."""
-        return float(self.fields.longest_dt.numpy().max())
+        return self._largest(self.fields.longest_dt)
 
     def aim(self, target: float, look: float = math.inf) -> None:
         """Set the time [s] that must be hit next, and that from which on the host looks, which shortens no step."""
