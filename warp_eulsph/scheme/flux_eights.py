@@ -1,6 +1,8 @@
 """Stress, waves, energy and histories of laws that have them for eight particles at once (``Law.eights``): on the CPU.
 
-A thread has a block of eight particles of one kind of law. Parameters are those of the kernels of ``flux_kernels.py``.
+A thread has a block of eight particles of one kind of law, fewer at the end of it, and of each independent run, which
+has a step and constants of its own. Block k begins with particle ``blocks[k]`` of the kind; other parameters are those
+of the kernels of ``flux_kernels.py``.
 """
 
 import functools
@@ -10,22 +12,23 @@ import warp as wp
 from ..fields import clock_structure, structure
 from ..materials import Law
 from ..materials.base import Eights, history_row
-from ..materials.in_eights import EIGHT
 from ..space import Space
 from .flux_kernels import keep_flux, keep_speeds, keep_update
-from .laws import laws_structure
+from .laws import constants_of_body, laws_structure
 
 
 @functools.cache
-def make_flux(space: Space, law: Law, eights: Eights, fixed: bool, dual: bool) -> wp.Kernel:
+def make_flux(space: Space, law: Law, eights: Eights, several: bool, fixed: bool, dual: bool) -> wp.Kernel:
     """Kernel: Q, and Π if it is kept."""
     mat, row, real, stress = space.mat, history_row(space, law), space.real, eights.stress
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Laws, Clock, keep = laws_structure(law), clock_structure(space), keep_flux(space, fixed, dual)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def compute_flux(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
@@ -37,9 +40,11 @@ def make_flux(space: Space, law: Law, eights: Eights, fixed: bool, dual: bool) -
         laws: Laws,
         flux: Flux,
     ):
-        own = (first + wp.tid()) * EIGHT
-        count, a = wp.min(len(history) - own, EIGHT), begin + own
-        stress(F, history, a, own, count, real(fraction * clock.dt[0]), laws.constants[0], flux.Q)
+        block = first + wp.tid()
+        own = blocks[block]
+        count, a = blocks[block + 1] - own, begin + own
+        ahead = real(fraction * clock.dt[clock.run[a]])
+        stress(F, history, a, own, count, ahead, constants_of(a, particles, laws), flux.Q)
         if wp.static(dual or not fixed):
             for b in range(a, a + count):
                 keep(b, flux.Q[b], reference, flux)
@@ -48,15 +53,17 @@ def make_flux(space: Space, law: Law, eights: Eights, fixed: bool, dual: bool) -
 
 
 @functools.cache
-def make_wave_speeds(space: Space, law: Law, eights: Eights, fixed: bool) -> wp.Kernel:
+def make_wave_speeds(space: Space, law: Law, eights: Eights, several: bool, fixed: bool) -> wp.Kernel:
     """Kernel: the wave speeds."""
     mat, row, pair, moduli = space.mat, history_row(space, law), space.row(2), eights.wave_moduli
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Laws, Clock, keep = laws_structure(law), clock_structure(space), keep_speeds(space, law, fixed)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
@@ -67,8 +74,10 @@ def make_wave_speeds(space: Space, law: Law, eights: Eights, fixed: bool) -> wp.
         flux: Flux,
         clock: Clock,
     ):
-        own = (first + wp.tid()) * EIGHT
-        count, a, c = wp.min(len(history) - own, EIGHT), begin + own, laws.constants[0]
+        block = first + wp.tid()
+        own = blocks[block]
+        count, a = blocks[block + 1] - own, begin + own
+        c = constants_of(a, particles, laws)
         M = moduli(F, history, a, own, count, c)
         for k in range(count):
             b, of_b = a + k, pair(M[0, k], M[1, k])
@@ -78,14 +87,16 @@ def make_wave_speeds(space: Space, law: Law, eights: Eights, fixed: bool) -> wp.
 
 
 @functools.cache
-def make_energy(space: Space, law: Law, eights: Eights) -> wp.Kernel:
+def make_energy(space: Space, law: Law, eights: Eights, several: bool) -> wp.Kernel:
     """Kernel: the stored energy."""
     mat, row, density = space.mat, history_row(space, law), eights.energy
     Particles, Laws = structure(space, "Particles"), laws_structure(law)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def energy(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         history: wp.array(dtype=row),
@@ -93,9 +104,10 @@ def make_energy(space: Space, law: Law, eights: Eights) -> wp.Kernel:
         laws: Laws,
         out: wp.array(dtype=wp.float64),
     ):
-        own = (first + wp.tid()) * EIGHT
-        count, a = wp.min(len(history) - own, EIGHT), begin + own
-        density(F, history, a, own, count, laws.constants[0], out)
+        block = first + wp.tid()
+        own = blocks[block]
+        count, a = blocks[block + 1] - own, begin + own
+        density(F, history, a, own, count, constants_of(a, particles, laws), out)
         for b in range(a, a + count):
             out[b] = wp.float64(particles.V0[b]) * out[b]
 
@@ -103,15 +115,17 @@ def make_energy(space: Space, law: Law, eights: Eights) -> wp.Kernel:
 
 
 @functools.cache
-def make_update(space: Space, law: Law, eights: Eights, tied: bool) -> wp.Kernel:
+def make_update(space: Space, law: Law, eights: Eights, several: bool, tied: bool) -> wp.Kernel:
     """Kernel: the history after a full step and the energy that it dissipated; a step of no length changes nothing."""
     real, mat, row, keep = space.real, space.mat, history_row(space, law), keep_update(space, law, tied)
     Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
     Flux, Laws, updated = structure(space, "Flux"), laws_structure(law), eights.update
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def update(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
@@ -122,9 +136,10 @@ def make_update(space: Space, law: Law, eights: Eights, tied: bool) -> wp.Kernel
         laws: Laws,
         flux: Flux,
     ):
-        own = (first + wp.tid()) * EIGHT
-        count, a = wp.min(len(history) - own, EIGHT), begin + own
-        dt, c = real(clock.dt[0]), laws.constants[0]
+        block = first + wp.tid()
+        own = blocks[block]
+        count, a = blocks[block + 1] - own, begin + own
+        dt, c = real(clock.dt[clock.run[a]]), constants_of(a, particles, laws)
         if dt > real(0.0):
             updated(F, history, a, own, count, dt, c, flux.dissipated)
             for k in range(count):
