@@ -1,6 +1,7 @@
 """Bodies that are runs of their own: each as it is alone, to the last bit, and one that fails ends alone."""
 
 import dataclasses
+import json
 import logging
 import re
 
@@ -9,11 +10,14 @@ import pytest
 import warp as wp
 from bodies import RUBBER, block
 from clouds import cloud
+from kept_runs import StopAfter
 
 import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.boundaries import Bound, Boundary
 from warp_eulsph.materials import J2, Failing, LinearHardening, PrincipalStrain
+from warp_eulsph.output import Recording, Run, record
+from warp_eulsph.schedule import EveryTime
 
 SIDE, RUNS = {1: 20, 2: 6, 3: 4}, 3
 FOLLOWING = [es.Never(), es.Every(3), es.Always()]
@@ -263,6 +267,30 @@ def test_resume_is_exact(reference, tmp_path):
         whole.runs.failures[1].step,
     )
     assert resumed.runs.failures[0] is None
+
+
+def test_a_directory_keeps_and_resumes_them(tmp_path):
+    """And says which ended, and how far each came."""
+
+    def build():
+        return es.Simulation([run(k) for k in range(RUNS)], boundaries=BLOW, independent=True)
+
+    kept = Recording(snapshots=EveryTime(0.002), fields=["velocity", "run_time"], dtype=np.float64)
+    whole, resumed = build(), build()
+    record(whole, tmp_path / "whole", 0.008, kept)
+    stop = StopAfter(13)
+    stopped = record(build(), tmp_path / "cut", 0.008, kept, stop=stop, watch=stop.watch)
+    assert stopped.stopped is not None and stopped.time < 0.008
+    record(resumed, tmp_path / "cut", 0.008, kept, resume=True)
+    assert np.array_equal(whole.x, resumed.x, equal_nan=True)
+    assert np.array_equal(whole.runs.steps, resumed.runs.steps)
+    for one, other in zip(Run(tmp_path / "whole"), Run(tmp_path / "cut"), strict=True):
+        assert one.time == other.time and np.array_equal(one["velocity"], other["velocity"], equal_nan=True)
+    last = Run(tmp_path / "whole")[-1]
+    reached = [np.unique(last["run_time"][numbers]).tolist() for numbers in whole.runs.ranges]
+    assert reached == [[0.008], [whole.runs.failures[1].time], [0.008]]
+    status = json.loads((tmp_path / "whole" / "status.json").read_text())
+    assert status["state"] == "done" and status["ended"] == [str(whole.runs.failures[1])]
 
 
 class Blind(Boundary):
