@@ -132,6 +132,14 @@ def test_eight_at_once_of_one_law():
     compare([[body] for body in bodies], unit=3e-4)
 
 
+def test_runs_of_several_media():
+    """Elastic, liquid and yielding, each by the options that suit it, and two of one medium."""
+    metal = {"material": METAL, "speed": 3.0}
+    bodies = [run(0), run(1, material=WATER, speed=0.3), run(2, **metal), run(3, **metal)]
+    together = compare([[body] for body in bodies], unit=2e-4)
+    assert len(together.stepper.media) == 3
+
+
 @pytest.mark.parametrize("options", [{}, {"material": METAL, "speed": 300.0}], ids=["rubber", "metal"])
 def test_bonded_bodies_are_one_run(options):
     pairs = []
