@@ -42,16 +42,17 @@ class Variable(NamedTuple):
 
 
 class Eights(NamedTuple):
-    """A law for ``count`` particles, eight or fewer, at once: on the CPU, where that is faster.
+    """A law for a block of eight particles or fewer at once: on the CPU, where that is faster.
 
-    Functions, ``wp.func``, of (F, history, first, own, count, …), arrays with the particles' F from ``first`` and their
-    histories from ``own`` on; equal to those of the law up to round-off.
+    Functions, ``wp.func``, of (block, …), the struct of ``block_structure`` in ``in_eights.py``; equal to those of the
+    law up to round-off.
 
     Attributes:
-        stress: (…, Δt, constants, P): P from ``first`` on.
-        energy: (…, constants, Ψ): Ψ [J/m^d] from ``first`` on, in float64.
+        stress: (…, Δt, constants, P): P from ``block.first`` on.
+        energy: (…, constants, Ψ): Ψ [J/m^d] from ``block.first`` on, in float64.
         wave_moduli: (…, constants) -> (2, 8): M and μ of each.
-        update: (…, Δt, constants, lost): histories, and the energy dissipated per initial volume from ``first`` on.
+        update: (…, Δt, constants, lost): histories, and the energy dissipated per initial volume from ``block.first``
+            on.
     """
 
     stress: wp.Function
