@@ -239,9 +239,16 @@ class Material(ABC):
         """Point functions in this space, cached: the same objects for the same space."""
 
     def filled_constants(self, law: Law) -> Any:
-        """``Law.Constants`` of this law with the values of ``constants``."""
-        filled = law.Constants()
-        for name, value in self.constants().items():
+        """``Law.Constants`` of this law with the values of ``constants``.
+
+        Raises:
+            ValueError: others than the fields of it.
+        """
+        filled, values, fields = law.Constants(), self.constants(), sorted(law.Constants.vars)
+        if not isinstance(values, dict) or sorted(values) != fields:
+            who = f"{type(self).__name__}.constants()"
+            raise ValueError(f"{who} must be a dict of {fields}, the fields of Law.Constants, got {values}")
+        for name, value in values.items():
             setattr(filled, name, value)
         return filled
 
