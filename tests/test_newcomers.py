@@ -1,12 +1,11 @@
 """Small mistakes of whoever is new: each error says what was wrong, what is allowed, what was given, and what to do."""
 
-import dataclasses
 import functools
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from bodies import RUBBER, block
+from bodies import RUBBER, block, lattice
 from case_files import small
 
 import warp_eulsph as es
@@ -79,20 +78,17 @@ def test_laws_of_ones_own(material, message):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("x", "volume", "message"),
     [
-        ({"volume": 1e-9 * 0.0625}, r"the nearest of its body 3.16e\+04 spacings away; that is 1 where x, volume and"),
-        ({"volume": 1e6 * 0.0625}, r"with 15 neighbours .* the nearest of its body 0.001 spacings away"),
-        (
-            {"x": np.zeros((1, 2)), "velocity": 0.0},
-            r"the nearest of its body inf spacings away; .* at least 2 particles",
-        ),
+        (lattice(2, 4), 0.0625e-9, r"the nearest of its body 3.16e\+04 spacings away; that is 1 where x, volume and"),
+        (lattice(2, 4), 0.0625e6, r"with 15 neighbours .* the nearest of its body 0.001 spacings away"),
+        (np.zeros((1, 2)), 1.0, r"the nearest of its body inf spacings away; .* at least 2 particles"),
     ],
     ids=["in mm", "in km", "one particle"],
 )
-def test_units_that_do_not_fit(change, message):
+def test_units_that_do_not_fit(x, volume, message):
     with pytest.raises(ValueError, match=message):
-        es.Simulation(dataclasses.replace(block(2, 4), spacing=None, **change))
+        es.Simulation(es.Body(x=x, volume=volume, material=RUBBER))
 
 
 def test_calls():
