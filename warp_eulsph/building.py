@@ -211,8 +211,8 @@ def check_neighbourhoods(world: World, bodies: Sequence[Body]) -> None:
         if close.size:
             raise ValueError(
                 f"particles of a body must not coincide, got {close.size} with a neighbour closer than 1e-6 spacings; "
-                f"the first is {who(first + int(close[0]))}; remove duplicates; in float32 "
-                "the origin must be near the bodies"
+                f"the first is {who(first + int(close[0]))}; remove duplicates; in float32 the "
+                "origin must be near the bodies"
             )
         poor = np.flatnonzero(configuration.poor.numpy())
         if poor.size:

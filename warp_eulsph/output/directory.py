@@ -92,7 +92,7 @@ class RunDirectory:
         """That no run is here, and why, in words."""
         if self.path.is_file():
             return f"no run in {self.path}, which is a file: cases are run by warp-eulsph run, into directories"
-        return f"no run in {self.path}: neither run.json nor snapshots are there"
+        return f"no run in {self.path}: run.json is not there"
 
     def check_own(self) -> None:
         """Refuse to begin a run where files of its names are somebody else's.
