@@ -40,7 +40,7 @@ class Failing(Material):
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Isotropic):
-            raise TypeError(f"material must be a law with young and poisson, got {self.material!r}")
+            raise ValueError(f"material must be a law with young and poisson such as J2(...), got {self.material!r}")
         if self.material.linear:
             raise ValueError(f"{type(self.material).__name__} is for small turns; pieces of what breaks turn")
         if isinstance(self.material, DruckerPrager):
