@@ -12,9 +12,30 @@ import warp as wp
 from ..fields import clock_structure, structure
 from ..materials import Law
 from ..materials.base import Eights, history_row
+from ..materials.in_eights import block_structure
 from ..space import Space
 from .flux_kernels import keep_flux, keep_speeds, keep_update
 from .laws import constants_of_body, laws_structure
+
+
+@functools.cache
+def block_of(space: Space, law: Law) -> wp.Function:
+    """``wp.func`` (number of a thread, where blocks begin, first particle of the kind, F, history) -> its block."""
+    mat, row = space.mat, history_row(space, law)
+    Block = block_structure(mat, row)
+
+    @wp.func
+    def block_of(
+        thread: int,
+        blocks: wp.array(dtype=wp.int32),
+        begin: int,
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+    ) -> Block:
+        own = blocks[thread]
+        return Block(F, history, begin + own, own, blocks[thread + 1] - own)
+
+    return block_of
 
 
 @functools.cache
@@ -23,6 +44,7 @@ def make_flux(space: Space, law: Law, eights: Eights, several: bool, fixed: bool
     mat, row, real, stress = space.mat, history_row(space, law), space.real, eights.stress
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Laws, Clock, keep = laws_structure(law), clock_structure(space), keep_flux(space, fixed, dual)
+    take = block_of(space, law)
     constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -40,14 +62,12 @@ def make_flux(space: Space, law: Law, eights: Eights, several: bool, fixed: bool
         laws: Laws,
         flux: Flux,
     ):
-        block = first + wp.tid()
-        own = blocks[block]
-        count, a = blocks[block + 1] - own, begin + own
-        ahead = real(fraction * clock.dt[clock.run[a]])
-        stress(F, history, a, own, count, ahead, constants_of(a, particles, laws), flux.Q)
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        ahead = real(fraction * clock.dt[clock.run[block.first]])
+        stress(block, ahead, constants_of(block.first, particles, laws), flux.Q)
         if wp.static(dual or not fixed):
-            for b in range(a, a + count):
-                keep(b, flux.Q[b], reference, flux)
+            for a in range(block.first, block.first + block.count):
+                keep(a, flux.Q[a], reference, flux)
 
     return compute_flux
 
@@ -58,6 +78,7 @@ def make_wave_speeds(space: Space, law: Law, eights: Eights, several: bool, fixe
     mat, row, pair, moduli = space.mat, history_row(space, law), space.row(2), eights.wave_moduli
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Laws, Clock, keep = laws_structure(law), clock_structure(space), keep_speeds(space, law, fixed)
+    take = block_of(space, law)
     constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -74,14 +95,12 @@ def make_wave_speeds(space: Space, law: Law, eights: Eights, several: bool, fixe
         flux: Flux,
         clock: Clock,
     ):
-        block = first + wp.tid()
-        own = blocks[block]
-        count, a = blocks[block + 1] - own, begin + own
-        c = constants_of(a, particles, laws)
-        M = moduli(F, history, a, own, count, c)
-        for k in range(count):
-            b, of_b = a + k, pair(M[0, k], M[1, k])
-            keep(b, of_b, F[b], grad_v[b], history[own + k], c, particles, reference, flux, clock)
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        c = constants_of(block.first, particles, laws)
+        M = moduli(block, c)
+        for k in range(block.count):
+            a, of_a = block.first + k, pair(M[0, k], M[1, k])
+            keep(a, of_a, F[a], grad_v[a], history[block.own + k], c, particles, reference, flux, clock)
 
     return wave_speeds
 
@@ -90,7 +109,7 @@ def make_wave_speeds(space: Space, law: Law, eights: Eights, several: bool, fixe
 def make_energy(space: Space, law: Law, eights: Eights, several: bool) -> wp.Kernel:
     """Kernel: the stored energy."""
     mat, row, density = space.mat, history_row(space, law), eights.energy
-    Particles, Laws = structure(space, "Particles"), laws_structure(law)
+    Particles, Laws, take = structure(space, "Particles"), laws_structure(law), block_of(space, law)
     constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -104,12 +123,10 @@ def make_energy(space: Space, law: Law, eights: Eights, several: bool) -> wp.Ker
         laws: Laws,
         out: wp.array(dtype=wp.float64),
     ):
-        block = first + wp.tid()
-        own = blocks[block]
-        count, a = blocks[block + 1] - own, begin + own
-        density(F, history, a, own, count, constants_of(a, particles, laws), out)
-        for b in range(a, a + count):
-            out[b] = wp.float64(particles.V0[b]) * out[b]
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        density(block, constants_of(block.first, particles, laws), out)
+        for a in range(block.first, block.first + block.count):
+            out[a] = wp.float64(particles.V0[a]) * out[a]
 
     return energy
 
@@ -119,7 +136,7 @@ def make_update(space: Space, law: Law, eights: Eights, several: bool, tied: boo
     """Kernel: the history after a full step and the energy that it dissipated; a step of no length changes nothing."""
     real, mat, row, keep = space.real, space.mat, history_row(space, law), keep_update(space, law, tied)
     Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
-    Flux, Laws, updated = structure(space, "Flux"), laws_structure(law), eights.update
+    Flux, Laws, updated, take = structure(space, "Flux"), laws_structure(law), eights.update, block_of(space, law)
     constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -136,18 +153,17 @@ def make_update(space: Space, law: Law, eights: Eights, several: bool, tied: boo
         laws: Laws,
         flux: Flux,
     ):
-        block = first + wp.tid()
-        own = blocks[block]
-        count, a = blocks[block + 1] - own, begin + own
-        dt, c = real(clock.dt[clock.run[a]]), constants_of(a, particles, laws)
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        dt, c = real(clock.dt[clock.run[block.first]]), constants_of(block.first, particles, laws)
         if dt > real(0.0):
-            updated(F, history, a, own, count, dt, c, flux.dissipated)
-            for k in range(count):
-                keep(a + k, history[own + k], flux.dissipated[a + k], c, particles, clock, flux)
-        else:
-            for b in range(a, a + count):
-                flux.dissipated[b] = real(0.0)
+            updated(block, dt, c, flux.dissipated)
+        for k in range(block.count):
+            a = block.first + k
+            if dt > real(0.0):
+                keep(a, history[block.own + k], flux.dissipated[a], c, particles, clock, flux)
+            else:
+                flux.dissipated[a] = real(0.0)
                 if wp.static(tied):
-                    flux.slipped[b] = real(0.0)
+                    flux.slipped[a] = real(0.0)
 
     return update
