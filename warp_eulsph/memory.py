@@ -45,7 +45,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.Devi
         reals += LANES * ((3 if moving else 4) + 2 * d)
     else:
         ints += 1  # stop
-        reals += 0 if moving else LANES * d + d * d  # ∇v or Π; ∇v F⁻¹
+        reals += 0 if moving else LANES * d + 3  # ∇v or Π; spin of ∇v F⁻¹
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1

@@ -37,7 +37,8 @@ class Sums:
         forces: written.
         epsilon: share of the upwind flux (M9), 0 where nothing dissipates.
         sensor: (n,) of vec in [0, 1] that switches M9 to first order; None without.
-        grad_p: ∇_k p (M4), written too; None where nobody asks (``Stabiliser.sums_pressure``).
+        p: pressure in the reference, (n,) of one real, and grad_p: ∇_k p (M4), written too; None where nobody asks
+            (``Stabiliser.sums_pressure``).
     """
 
     configuration: Configuration
@@ -46,6 +47,7 @@ class Sums:
     forces: ForceArrays
     epsilon: float = 0.0
     sensor: wp.array | None = None
+    p: wp.array | None = None
     grad_p: wp.array | None = None
 
 
@@ -71,7 +73,8 @@ class Stabiliser(ABC):
         """Whether ``compute``, with a sensor or without, takes Π from the array of the flux (M5)."""
         return True
 
-    def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
+    @property
+    def sums_pressure(self) -> bool:
         """Whether ``compute`` can sum ∇_k p with the forces, for M24."""
         return False
 
