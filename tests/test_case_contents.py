@@ -151,3 +151,18 @@ def test_bad_overrides_are_named(override, message):
     with pytest.raises(CaseError) as caught:
         read_case(CASES / "punch.toml", [override])
     assert message in str(caught.value)
+
+
+def test_a_mirror_is_as_deep_as_what_its_body_is_bonded_to_needs():
+    """A liquid bonded to a gas takes what suits a gas: three supports of 2.6 spacings, not of the 3.6 of liquids."""
+    data = small()
+    liquid, gas = {"kind": "TaitLiquid", "density": 1e3, "sound_speed": 20}, {"kind": "IdealGas", "density": 1.0}
+    shape = {"kind": "box", "lower": [0, 0], "upper": [20, 1], "spacing": 0.25}
+    mirrored = {"mirror": [{"point": [20, 0], "normal": [1, 0]}], "bonded": "gas"}
+    data["body"] = {
+        "gas": {"shape": {**shape, "lower": [-1, 0], "upper": [0, 1]}, "material": {**gas, "pressure": 1e5}},
+        "liquid": {"shape": shape, "material": liquid, **mirrored},
+    }
+    simulation = parse_case(data).build()
+    ghosts = simulation.ranges["liquid"].stop - 16 - 320
+    assert ghosts == 4 * int(3.0 * 2.6 - 0.5 + 1.0)

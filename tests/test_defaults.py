@@ -107,12 +107,17 @@ def test_a_liquid_rests_in_a_tank_by_default():
     assert simulation.configuration.nearest().min() > 0.4 / 20
 
 
-def test_vortices_go_on_by_default():
-    """Taylor–Green at Re 100, 32²: 7 % below the exact amplitude after 1 s (2.9 % at 64²), particles kept even."""
-    simulation = taylor_green.build(32, options={})
+@pytest.mark.parametrize(("n", "jitter", "most"), [(32, 0.0, 0.08), (32, 0.01, 0.03), (30, 0.01, 0.04)])
+def test_vortices_go_on_by_default(n, jitter, most):
+    """Taylor–Green at Re 100, 32²: 7 % below the exact amplitude after 1 s (2.9 % at 64²), particles kept even.
+
+    From 1 % jitter 2.4 % (64²: 0.4 % above), and at 30² 3 %, which as a lattice, with particles on the saddles of the
+    flow, loses 25 %.
+    """
+    simulation = taylor_green.build(n, jitter, options={})
     simulation.run(1.0)
     errors = taylor_green.errors(simulation)
-    assert -0.08 < errors["amplitude"] < 0.0 and errors["field"] < 0.08 and errors["nearest"] > 0.6
+    assert -most < errors["amplitude"] < 0.0 and errors["field"] < 1.1 * most and errors["nearest"] > 0.6
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.1])

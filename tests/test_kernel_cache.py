@@ -4,6 +4,12 @@ import subprocess
 import sys
 
 import pytest
+import warp as wp
+
+from warp_eulsph import kernel_cache
+from warp_eulsph.operators.correction import make_correct
+from warp_eulsph.operators.gradient import make_gradient
+from warp_eulsph.space import Space
 
 PROGRAM = """
 import logging, sys
@@ -17,6 +23,8 @@ simulation = es.Simulation(es.Body(x=x, volume=volume, velocity=x, material=es.B
 simulation.step(2)
 print("energy", simulation.energy()["total"].hex())
 """
+
+SPACE = Space(3, wp.float64)
 
 
 def run(cache):
@@ -34,6 +42,36 @@ def cache(tmp_path_factory):
 
 # How much is left of a file of a length; a flipped bit in the machine code itself is not seen.
 DAMAGES = (lambda length: length // 2, lambda length: 0, lambda length: 100, lambda length: length - 10)
+
+
+@pytest.mark.of_the_cpu
+@pytest.mark.parametrize("kernel", [make_gradient(SPACE, 3, simd=True), make_correct(SPACE)], ids=lambda k: k.key)
+def test_templates_instantiated_with_the_header_change_no_byte(tmp_path, kernel):
+    before, given, codes = dict(kernel.module.options), wp.config.cpu_compiler_flags, []
+    try:
+        for name, flags in (("plain", given), ("once", f"{given} {kernel_cache.ONCE}")):
+            wp.set_module_options({"cpu_compiler_flags": flags}, kernel.module)
+            wp.compile_aot_module(kernel.module, "cpu", module_dir=tmp_path / name, strip_hash=True)
+            (code,) = (tmp_path / name).glob("*.o")
+            codes.append(code.read_bytes())
+    finally:
+        wp.set_module_options(before, kernel.module)
+    assert len(codes[0]) > 1000 and codes[0] == codes[1]
+
+
+def test_flags_that_a_user_gave_are_kept(monkeypatch):
+    class Module:
+        name, options = "make_forces__locals__forces", {"cpu_compiler_flags": None}
+
+    monkeypatch.setattr(wp, "set_module_options", lambda options, module: setattr(module, "options", options))
+    for given, found in (("-O1", "-O1"), ("", ""), (None, kernel_cache.WARPS_FLAGS)):
+        monkeypatch.setattr(wp.config, "cpu_compiler_flags", given)
+        module = Module()
+        kernel_cache._instantiate_once(module)
+        assert module.options == {"cpu_compiler_flags": f"{found} {kernel_cache.ONCE}"}
+        monkeypatch.setattr(wp.config, "cpu_compiler_flags", "-O3")
+        kernel_cache._instantiate_once(module)  # what a module was first loaded with stays
+        assert module.options == {"cpu_compiler_flags": f"{found} {kernel_cache.ONCE}"}
 
 
 def test_what_is_damaged_is_built_anew(cache):
@@ -56,8 +94,6 @@ def test_what_is_damaged_is_built_anew(cache):
 
 
 def test_what_cannot_be_removed_is_one_clear_error(monkeypatch, tmp_path):
-    from warp_eulsph import kernel_cache
-
     path = tmp_path / "wp__make_adopt.o"
     path.mkdir()  # which unlink refuses
     with pytest.raises(OSError, match=r"the compiled kernel .* cannot be removed .*WARP_CACHE_PATH=FOLDER"):
@@ -65,12 +101,8 @@ def test_what_cannot_be_removed_is_one_clear_error(monkeypatch, tmp_path):
 
 
 def test_other_programs_modules_are_left_alone(monkeypatch, tmp_path):
-    import warp as wp
-
-    from warp_eulsph import kernel_cache
-
     class Theirs:
-        name = "simulation"
+        name, options = "simulation", {"cpu_compiler_flags": None}
 
     monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
     assert kernel_cache._compiled(Theirs(), None) == []
@@ -82,4 +114,4 @@ def test_other_programs_modules_are_left_alone(monkeypatch, tmp_path):
 
     with pytest.raises(RuntimeError, match="as it was"):
         kernel_cache._rebuilding(load)(Theirs(), "cpu")
-    assert len(calls) == 1
+    assert len(calls) == 1 and Theirs.options == {"cpu_compiler_flags": None}

@@ -342,8 +342,8 @@ def test_errors_name_the_particle_by_the_users_number():
     simulation.stepper.rebuild()
     with pytest.raises(es.UnstableError) as caught:
         simulation.step()
-    bad = np.flatnonzero(~np.isfinite(simulation.v).all(axis=1))
-    first = bad[simulation.order.places[bad].argmin()]
-    assert caught.value.particle == first != simulation.order.places[first]
-    where = np.array2string(simulation.x[first], precision=6)
-    assert f"particle {first} of body 'free' at x = {where} m has non-finite values" in str(caught.value)
+    named, X = caught.value.particle, simulation.X
+    assert not np.isfinite(simulation.v[named]).all()
+    assert named != simulation.order.places[named]
+    where = np.array2string(X[named], precision=6)
+    assert f"particle {named} of body 'free' at x = {where} m at the start has non-finite values" in str(caught.value)

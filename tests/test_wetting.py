@@ -263,19 +263,54 @@ def test_nothing_leaks_through_two_particles():
     assert abs(energy["interaction"]) < 1e-12 * energy["total"] and abs(energy["residual"]) < 1e-12 * energy["total"]
 
 
-@pytest.mark.parametrize(("layers", "told"), [(3, True), (4, False)])
-def test_solids_thinner_than_the_liquid_reaches_are_told(layers, told, caplog):
-    """By the weight of liquids 3.6 spacings less half of one; what to do stands in the warning."""
-    x, volume = box((0.0, 0.0), (2.0, 0.4), 0.05)
-    pool = es.Body(x=x, volume=volume, material=WATER, spacing=0.05, name="water")
-    x, volume = box((0.0, -0.05 * layers), (2.0, 0.0), 0.05)
+def told_of_thin(x, volume, spacing, caplog):
+    """What is said of a solid of particles ``x`` beside water of spacing 1, whose weight reaches 3.1 into it."""
+    dim = x.shape[1]
+    pool, each = box((0.0,) * dim, (8.0, *[4.0] * (dim - 1)), 1.0)
+    water = es.Body(x=pool - 12.0, volume=each, material=WATER, spacing=1.0, name="water")
     rubber = es.NeoHookean(density=1000.0, young=1e6, poisson=0.3)
-    plate = es.Body(x=x, volume=volume, material=rubber, spacing=0.05, name="plate")
-    es.Simulation([plate, pool], interactions=[es.Contact()])
-    lines = [record.getMessage() for record in caplog.records if "thick" in record.getMessage()]
-    assert len(lines) == told
-    if told:
-        assert "'plate' is some 0.14" in lines[0] and "'water' reaches 0.155 m" in lines[0]
+    solid = es.Body(x=x, volume=volume, material=rubber, spacing=spacing, name="solid")
+    es.Simulation([solid, water], interactions=[es.Contact()])
+    return [record.getMessage() for record in caplog.records if "thick" in record.getMessage()]
+
+
+SIDES = ["4", "3", "16 4", "16 3", "4 4", "3 3", "4 4 4", "3 3 3", "12 12 4", "12 12 2", "12 4 4", "12 3 3"]
+
+
+@pytest.mark.parametrize("spacing", [0.5, 1.0])
+@pytest.mark.parametrize("sides", SIDES)
+def test_solids_thinner_than_the_liquid_reaches_are_told(sides, spacing, caplog):
+    """Plates, rods, cubes: their shortest side counts, 3.6 spacings of the liquid less half of one are its reach."""
+    sides = [float(side) for side in sides.split()]
+    lines = told_of_thin(*box((0.0,) * len(sides), sides, spacing), spacing, caplog)
+    assert len(lines) == (min(sides) < 3.1)
+    if lines:
+        assert f"'solid' is {min(sides):g} m thick," in lines[0] and "'water' reaches 3.1 m into" in lines[0]
+        assert f"should be {min(sides) / 3.1:.3g} m or less, is 1 m" in lines[0]
+
+
+@pytest.mark.parametrize("hollow", [False, True])
+@pytest.mark.parametrize(("dim", "radius"), [(2, 2.0), (2, 1.4), (3, 2.0), (3, 1.4)])
+def test_round_solids_are_as_thick_as_their_diameter(dim, radius, hollow, caplog):
+    """Or as their wall; where surfaces are is known to half a spacing each."""
+    x, volume = box((-8.0,) * dim, (8.0,) * dim, 0.4)
+    r = np.linalg.norm(x, axis=1)
+    inside = (r > 6.0) & (r < 6.0 + radius) if hollow else r < radius
+    lines = told_of_thin(x[inside], np.broadcast_to(volume, len(x))[inside], 0.4, caplog)
+    thick = radius if hollow else 2.0 * radius
+    assert len(lines) == (thick < 3.1)
+    if lines:
+        assert float(lines[0].split("is ")[1].split(" m")[0]) == pytest.approx(thick, abs=0.4)
+
+
+def test_solids_bonded_to_something_thick_are_not_thin(caplog):
+    """A coat of one layer, by itself too thin."""
+    rubber = es.NeoHookean(density=1000.0, young=1e6, poisson=0.3)
+    bodies = [es.Body(x=box((0.0, -9.0), (8.0, -4.0), 1.0)[0], volume=1.0, material=WATER, name="water")]
+    bodies += [es.Body(x=box((0.0, 1.0), (8.0, 5.0), 1.0)[0], volume=1.0, material=rubber, name="block")]
+    coat = es.Body(x=box((0.0, 0.0), (8.0, 1.0), 1.0)[0], volume=1.0, material=rubber, name="coat", bonded="block")
+    es.Simulation([*bodies, coat], interactions=[es.Contact()])
+    assert not [record for record in caplog.records if "thick" in record.getMessage()]
 
 
 def test_a_coat_is_as_thick_as_what_it_is_bonded_to(caplog):

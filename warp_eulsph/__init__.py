@@ -29,7 +29,7 @@ from .boundaries import (
     mirror,
 )
 from .interactions import Contact, Interaction, RigidBody
-from .kernel_cache import rebuild_damaged
+from .kernel_cache import look_after_kernels
 from .materials import (
     Bar,
     LinearElastic,
@@ -153,5 +153,5 @@ __all__ = [
 ]
 
 explain_mistakes(__all__, globals())
-rebuild_damaged()
+look_after_kernels()
 sum_up_compiling()

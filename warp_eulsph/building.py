@@ -1,6 +1,6 @@
 """Bodies and options as the parts of a world: particles, a state, and the media that share a reference."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -101,17 +101,11 @@ def plan_media(bodies: Sequence[Body], defaults: Given) -> list[MediumPlan]:
     """
     ranges = ranges_of(bodies)
     every = options_of_each(bodies, defaults)
-    kind = type(every[bodies[0].name].scheme if defaults.scheme is None else defaults.scheme)
+    _check_kinds(bodies, every, defaults.scheme)
     media: list[MediumPlan] = []
     for body in bodies:
         options = every[body.name]
         check_reference([body.material], options.reference)
-        if type(options.scheme) is not kind:
-            raise ValueError(
-                f"scheme of body {body.name!r} must be {kind.__name__}(...), as the simulation's, for "
-                f"all take the same steps, got {options.scheme}; pass scheme={type(options.scheme).__name__}(...) to "
-                "the simulation"
-            )
         together, span = [body], ranges[body.name]
         if not options.arrangement.moves(body.material):
             options = options._replace(reference=Never())
@@ -129,21 +123,37 @@ def plan_media(bodies: Sequence[Body], defaults: Given) -> list[MediumPlan]:
     return media
 
 
+def _check_kinds(bodies: Sequence[Body], every: Mapping[str, Options], given: Scheme | None) -> None:
+    """Raise ValueError unless schemes are of one kind: that of the one ``given`` to the simulation, or the first."""
+    first = bodies[0]
+    whose, kind = ("the simulation", type(given)) if given else (f"body {first.name!r}", type(every[first.name].scheme))
+    for body in bodies:
+        other = type(every[body.name].scheme)
+        if other is not kind:
+            remedy = f"give body {body.name!r} scheme={kind.__name__}(...)"
+            if given is None and None in (first.scheme, body.scheme):
+                remedy += f", or the simulation scheme={(other if body.scheme else kind).__name__}(...)"
+            raise ValueError(
+                f"schemes must be of one kind, for all bodies take the same steps, got {kind.__name__} of {whose} and "
+                f"{other.__name__} of body {body.name!r}{'' if body.scheme else ' by default'}; {remedy}"
+            )
+
+
 def options_of_each(bodies: Sequence[Body], defaults: Given) -> dict[str, Options]:
-    """Name of each body -> its options; bonded ones take what suits their matter together."""
+    """Name of each body -> its options: its own, for those that are None the simulation's, then what suits its matter.
+
+    Bonded bodies take what suits theirs together.
+    """
     matter: dict[int, list[Material]] = {}
-    groups = groups_of(bodies)
+    groups, found = groups_of(bodies), {}
     for body, group in zip(bodies, groups, strict=True):
         matter.setdefault(group, []).append(body.material)
-    return {body.name: options_of(body, matter[group], defaults) for body, group in zip(bodies, groups, strict=True)}
-
-
-def options_of(body: Body, matter: Sequence[Material], defaults: Given) -> Options:
-    """The options of a body: its own, for those that are None the simulation's, then what suits ``matter``."""
-    found: dict[str, Any] = suited(matter)._asdict()
-    for given in (defaults._asdict(), {name: getattr(body, name) for name in Options._fields}):
-        found |= {name: value for name, value in given.items() if value is not None}
-    return Options(**found)
+    for body, group in zip(bodies, groups, strict=True):
+        options: dict[str, Any] = suited(matter[group])._asdict()
+        for given in (defaults._asdict(), {name: getattr(body, name) for name in Options._fields}):
+            options |= {name: value for name, value in given.items() if value is not None}
+        found[body.name] = Options(**options)
+    return found
 
 
 def ranges_of(bodies: Sequence[Body]) -> dict[str, range]:

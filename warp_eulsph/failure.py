@@ -6,11 +6,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from .body import Body
-from .order import Order
 from .scheme.arrangement import Arrangement
 from .scheme.health import WELL, UnstableError, last_good
-from .scheme.stepper import Stepper
 from .scheme.time_step import DeviceClock
+from .worst import Bad, worst_of
 
 log = logging.getLogger(__name__)
 
@@ -23,7 +22,7 @@ MADE = 0.5
 SETTLING = 100
 
 
-class Failing(Protocol):
+class Failing(Bad, Protocol):
     """What is asked of a simulation.
 
     Attributes:
@@ -32,9 +31,7 @@ class Failing(Protocol):
         broken: words on the first particle that failed by its law.
     """
 
-    stepper: Stepper
     clock: DeviceClock
-    order: Order
     bodies: list[Body]
     ranges: dict[str, range]
     arrangement: Arrangement
@@ -50,18 +47,6 @@ class Failing(Protocol):
     def steps(self) -> int:
         """Steps taken."""
 
-    @property
-    def x(self) -> np.ndarray:
-        """Positions [m], (n, dim)."""
-
-    @property
-    def v(self) -> np.ndarray:
-        """Velocities [m/s], (n, dim)."""
-
-    @property
-    def F(self) -> np.ndarray:
-        """Deformation gradients, (n, dim, dim)."""
-
     def history(self, name: str) -> np.ndarray:
         """What materials remember under this name, by number."""
 
@@ -69,16 +54,15 @@ class Failing(Protocol):
 def failure(simulation: Failing) -> UnstableError | None:
     """What is wrong with the present state of a ``Simulation``, None while all is well; reads the device."""
     place, dt = simulation.clock.bad, simulation.clock.free_dt
-    remedy = "try a smaller cfl, a finer resolution or a limiter"
+    step = f"a shorter step than {fixed:g} s" if (fixed := simulation.clock.option.fixed) else "a smaller cfl"
+    remedy = f"try {step}, a finer resolution or a limiter"
     if place is not None:
-        particle = int(simulation.order.ids.numpy()[place])
-        x, v, F = simulation.x[particle], simulation.v[particle], simulation.F[particle]
-        if np.isfinite(x).all() and np.isfinite(v).all() and np.isfinite(F).all():
-            what = f"det F = {np.linalg.det(F):.4g}, must be positive"
-            if np.linalg.det(F) > 0.0:
-                what = f"no state that its material allows, {_history(simulation, particle)}, F = {F.tolist()}"
-        else:
-            what = f"non-finite values, v = {v}, F = {F.tolist()}"
+        particle, what = _worst(simulation, place)
+        material = body_of(simulation, particle).material
+        if material.flows:
+            remedy = f"try {step} or a finer resolution"
+        if material.liquid:
+            remedy += ", or stiffer matter: a sound_speed of 10 times the largest speed of the flow"
     elif dt < STALLED * simulation.clock.longest_dt:
         particle = _fastest(simulation)
         what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
@@ -91,18 +75,38 @@ def failure(simulation: Failing) -> UnstableError | None:
         return _look_for_tears(simulation)
     return UnstableError(
         f"unstable at t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
-        f"{where(simulation, particle, simulation.x)} has {what}; {last_good(simulation.output)}; {remedy}",
+        f"{where(simulation, particle)} has {what}; {last_good(simulation.output)}; {remedy}",
         particle,
         simulation.t,
         simulation.steps,
     )
 
 
+def _worst(simulation: Failing, place: int) -> tuple[int, str]:
+    """The particle that is named, and words on what it has and how many are bad."""
+    particle, J, finite, bad = worst_of(simulation, place)
+    F = f"F = {simulation.F[particle].tolist()}"
+    if J <= 0.0 and body_of(simulation, particle).material.forgets:  # which made 0 of whatever J was
+        what = "no volume left, its J = det F went from positive to zero or below in this step"
+    elif J <= 0.0:
+        what = f"det F = {J:.4g}, must be positive"
+    elif finite:
+        what = f"no state that its material allows, {_history(simulation, particle)}, {F}"
+    else:
+        what = f"non-finite values, v = {simulation.v[particle]}, {F}"
+    n = len(simulation.order.places)
+    if bad == n > 1:
+        what += f"; all {n} particles are bad, as when steps are too long or units do not fit"
+    elif bad > 1:
+        what += f"; {bad} of {n} particles are bad"
+    return particle, what
+
+
 def _look_for_tears(simulation: Failing) -> UnstableError | None:
     """Note the first tear of a solid and log it, once; it is a failure where the arrangement says so."""
     if simulation.tear is None:
         for particle in _first_torn(simulation):
-            body = next(body for body in simulation.bodies if particle in simulation.ranges[body.name])
+            body = body_of(simulation, particle)
             if body.material.flows:  # opens and closes all the time
                 continue
             simulation.tear = _tear(simulation, particle)
@@ -123,7 +127,7 @@ def _look_for_failed(simulation: Failing) -> None:
             particle = int(simulation.order.ids.numpy()[found[0]])
             simulation.broken = (
                 f"matter has failed by t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
-                f"{where(simulation, particle, simulation.x)} is among the first"
+                f"{where(simulation, particle)} is among the first"
             )
             log.warning("%s", simulation.broken)
 
@@ -133,7 +137,7 @@ def _tear(simulation: Failing, particle: int) -> UnstableError:
     lost = -simulation.stepper.ledger.accounts()["dissipation"]
     return UnstableError(
         f"a solid comes apart without a law of failure by t = {simulation.t:.8g} s, step {simulation.steps}: the first "
-        f"particle with a new face is {particle} {where(simulation, particle, simulation.x)}; dissipation has taken "
+        f"particle with a new face is {particle} {where(simulation, particle)}; dissipation has taken "
         f"{lost:.4g} J so far; arrangement=Convected() holds solids together",
         particle,
         simulation.t,
@@ -149,10 +153,17 @@ def _first_torn(simulation: Failing) -> list[int]:
     return [int(ids[place]) for place in places if place < len(ids)]
 
 
-def where(simulation: Failing, particle: int, x: np.ndarray) -> str:
-    """Words on a particle's body and place."""
-    name = next(name for name, indices in simulation.ranges.items() if particle in indices)
-    return place_of(name, x[particle])
+def body_of(simulation: Failing, particle: int) -> Body:
+    """The body of a particle."""
+    return next(body for body in simulation.bodies if particle in simulation.ranges[body.name])
+
+
+def where(simulation: Failing, particle: int) -> str:
+    """Words on a particle's body and place, that of the start where it has none."""
+    name, x = body_of(simulation, particle).name, simulation.x[particle]
+    if np.isfinite(x).all():
+        return place_of(name, x)
+    return f"{place_of(name, simulation.X[particle])} at the start"
 
 
 def place_of(body: str, x: np.ndarray) -> str:

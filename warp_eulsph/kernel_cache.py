@@ -1,4 +1,8 @@
-"""Compiled kernels that were damaged in Warp's cache: built anew.
+"""How the package's kernels are compiled, and built anew where they were damaged in Warp's cache.
+
+Each kernel is a module, and each reads Warp's header in the compiler's own form. More than half of what that took went
+into templates of the header, instantiated again in every module; now they are instantiated once, with the header. The
+machine code is the same in every byte.
 
 Warp keeps each module of kernels in a folder of its cache and believes what lies there. A file that a full disk or a
 power failure cut short can then not be loaded, in every later run. Nothing is lost by building it again.
@@ -17,10 +21,14 @@ log = logging.getLogger(__name__)
 OWN = ("_make_", "make_")
 # What Warp compiles and reads again, beside its source.
 _COMPILED = (".o", ".meta", ".cubin", ".ptx")
+# Clang's option for the above, https://reviews.llvm.org/D69585
+ONCE = "-fpch-instantiate-templates"
+# What Warp takes where ``wp.config.cpu_compiler_flags`` is None
+WARPS_FLAGS = "-march=native"
 
 
-def rebuild_damaged() -> None:
-    """From now on the package's kernels that cannot be loaded from Warp's cache are compiled anew; once is enough.
+def look_after_kernels() -> None:
+    """From now on the package's kernels are compiled fast, and anew if they cannot be loaded; once is enough.
 
     Only files of the module that Warp failed to load are removed; when it fails again, that is the error. A file
     that can be loaded and has wrong bits is not seen.
@@ -33,6 +41,7 @@ def rebuild_damaged() -> None:
 def _rebuilding(load: Any) -> Any:
     @functools.wraps(load)
     def rebuilding(module: Any, device: wp.DeviceLike, block_dim: int | None = None, *more: Any, **options: Any) -> Any:
+        _instantiate_once(module)
         try:
             return load(module, device, block_dim, *more, **options)
         except Exception as error:  # of no kind of its own
@@ -45,6 +54,14 @@ def _rebuilding(load: Any) -> Any:
 
     rebuilding.rebuilds = True  # type: ignore[attr-defined]
     return rebuilding
+
+
+def _instantiate_once(module: Any) -> None:
+    """Of a module of the package that has no flags of its own yet."""
+    if module.name.startswith(OWN) and module.options["cpu_compiler_flags"] is None:
+        given = wp.config.cpu_compiler_flags
+        flags = f"{WARPS_FLAGS if given is None else given} {ONCE}"
+        wp.set_module_options({"cpu_compiler_flags": flags}, module)
 
 
 def _compiled(module: Any, block_dim: int | None) -> list[Path]:

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
+from ..body import checked_bodies
 from ..boundaries import Boundary, mirror
 from ..boundaries.mirror import Image
-from ..building import Given, options_of
+from ..building import Given, options_of_each
 from ..interactions import Contact, Interaction, RigidBody
 from ..materials import Material
 from ..output import DEFAULT_FIELDS, FIELDS, Probe
@@ -143,8 +144,7 @@ class Case(Problem):
 
     def build(self) -> Simulation:
         """The simulation at its start; raises as ``Problem.build``."""
-        bodies, ghosts = [], []
-        space = self.space
+        space, ghosts = self.space, []
         defaults = Given(
             reference=self.reference.make(),
             arrangement=self.arrangement.make(),
@@ -152,18 +152,17 @@ class Case(Problem):
             weight=self.weight.make(),
             dilation=self.dilation,
         )
-        for name, table in self.body.items():
-            body = table.build(name)
+        bodies = checked_bodies([table.build(name) for name, table in self.body.items()])
+        options = options_of_each(bodies, defaults)
+        for k, table in enumerate(self.body.values()):
             for plane in table.mirror:
-                depth = plane.depth
+                depth, own = plane.depth, options[bodies[k].name]
                 if depth is None:
-                    own = options_of(body, [body.material], defaults)
-                    depth = 3.0 * own.weight.support * own.dilation * float(body.spacing.max())
-                body, condition = mirror(
-                    body, point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()
+                    depth = 3.0 * own.weight.support * own.dilation * float(bodies[k].spacing.max())
+                bodies[k], condition = mirror(
+                    bodies[k], point=plane.point, normal=plane.normal, depth=depth, image=plane.image.make()
                 )
                 ghosts.append(condition)
-            bodies.append(body)
         conditions: Sequence[Boundary] = [condition.make(space) for condition in self.boundary]
         rigid = [RigidBody(**table.arguments(space), name=name) for name, table in self.rigid.items()]
         return Simulation(

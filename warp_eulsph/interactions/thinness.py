@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundaries import Assembly
+from ..boundaries.outermost import BLOCKING, pairs
 
 if TYPE_CHECKING:
     from ..scheme.world import World
@@ -14,6 +15,40 @@ if TYPE_CHECKING:
     from .wetting_solids import WettingOfSolids
 
 log = logging.getLogger(__name__)
+
+# Cosine between the ways out of opposite faces: 120°, so that sides that meet in a corner are none.
+OPPOSITE = -0.5
+# Spacings from a corner, whose way out leads along a diagonal, to the next particle of each of its faces: √2 and some.
+BESIDE = 1.5
+# Particles whose pairs are in memory at once: some hundred each where they are five times as fine as the liquid.
+AT_ONCE = 4096
+
+
+def thickness(x: np.ndarray, outward: np.ndarray, spacing: np.ndarray, reach: float) -> float:
+    """How thick matter is beneath its outermost particles [m], of a box its shortest side; inf beyond ``reach``.
+
+    Beneath each it is how far the opposite face lies along the normal, there or beneath a particle beside. The share
+    1/dim of them have no more: the two faces across the shortest side of a box are as much of its surface or more.
+
+    Args:
+        x: places of the outermost particles [m], (k, dim). outward: vectors out of the matter there, (k, dim).
+        spacing: of each [m], (k,); they lie half of it beneath the surface. reach: [m].
+    """
+    normal = outward / np.linalg.norm(outward, axis=1, keepdims=True)
+    own, least = np.full((2, len(x)), np.inf)
+    for part in np.array_split(np.arange(len(x)), len(x) // AT_ONCE + 1):
+        a, b = pairs(x[part], x, reach)
+        a = part[a]
+        opposite = (normal[a] * normal[b]).sum(axis=1) < OPPOSITE
+        a, b = a[opposite], b[opposite]
+        away, mean = x[a] - x[b], 0.5 * (spacing[a] + spacing[b])
+        depth, length = (away * normal[a]).sum(axis=1), np.linalg.norm(away, axis=1)
+        across = np.linalg.norm(away - depth[:, None] * normal[a], axis=1)
+        through = (depth > 0.0) & (across < BLOCKING * mean) & (length + mean < reach)
+        np.minimum.at(own, a[through], (length + mean)[through])
+    a, b = pairs(x, x, BESIDE * float(spacing.max()))
+    np.minimum.at(least, a, own[b])
+    return float(np.sort(least)[(len(x) - 1) // x.shape[1]])
 
 
 def tell_thin(
@@ -23,10 +58,9 @@ def tell_thin(
     touching: Collection[tuple[str, str]],
     wettings: Sequence["WettingOfSolids"],
 ) -> None:
-    """Warn of bodies in the sums of a liquid (M28) whose mean thickness, 2 V/A, is less than its weight reaches.
+    """Warn of bodies in the sums of a liquid (M28) that are thinner than its weight reaches.
 
-    Bonded ones are one: a thin coat of something thick is not thin. 2 V/A of a block is less than its shortest side,
-    that of a cube a third of it.
+    Bonded ones are one: a thin coat of something thick is not thin.
 
     Args:
         world: at its start.
@@ -36,12 +70,12 @@ def tell_thin(
     """
     if not wettings:
         return
-    by_number, area = assembly.order.by_number, np.zeros(len(assembly.X))
-    area[skin.indices] = np.where(skin.there.numpy() == 1, skin.area.numpy(), 0.0)
-    particles = world.particles
-    V0, spacing, h, group = (
-        by_number(array.numpy()) for array in (particles.V0, particles.spacing, particles.h, particles.group)
+    by_number, particles = assembly.order.by_number, world.particles
+    outward, spacing, h, group = (
+        by_number(array.numpy()) for array in (particles.outward, particles.spacing, particles.h, particles.group)
     )
+    outermost = skin.indices[skin.there.numpy() == 1]
+    outermost = outermost[outward[outermost].any(axis=1)]
     for wetting in wettings:
         liquid = np.arange(wetting.medium.span.start, wetting.medium.span.stop)
         dx, support = float(spacing[liquid].max()), wetting.medium.configuration.weight.support
@@ -51,16 +85,14 @@ def tell_thin(
         for name, own in assembly.bodies.items():
             if own.start not in wetting.medium.span and any((each, name) in touching for each in names):
                 bonded.setdefault(int(group[own.start]), []).append(name)
-        for solids in bonded.values():
-            numbers = np.concatenate([assembly.bodies[name] for name in solids])
-            if (faces := area[numbers].sum()) == 0.0:
-                continue
-            thick = 2.0 * float(V0[numbers].sum() / faces)
+        for number, solids in bonded.items():
+            own = outermost[group[outermost] == number]
+            thick = thickness(assembly.X[own], outward[own], spacing[own], reach) if len(own) else np.inf
             if thick < reach:
                 log.warning(
-                    "Contact: %s is some %.3g m thick (2 V/A), and the weight of %s reaches %.3g m into it: the liquid "
-                    "feels what is behind, and may pass; its spacing should be %.3g m or less, is %.3g m. Make it "
-                    "finer, or give it weight=CubicSpline(), dilation=1.3, which reaches 2.6 spacings",
+                    "Contact: %s is %.3g m thick, and the weight of %s reaches %.3g m into it: the liquid feels what "
+                    "is behind, and may pass; its spacing should be %.3g m or less, is %.3g m. Make it finer, or give "
+                    "it weight=CubicSpline(), dilation=1.3, which reaches 2.6 spacings",
                     " with ".join(map(repr, solids)),
                     thick,
                     ", ".join(map(repr, names)),

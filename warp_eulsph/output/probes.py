@@ -11,7 +11,6 @@ import numpy as np
 import warp as wp
 
 from ..boundaries import Boundary
-from ..building import options_of_each
 from ..diagnostics import BodySums, SectionForce
 from ..interactions import BoundRigidBody
 from ..schedule import EverySteps, Schedule
@@ -247,8 +246,10 @@ def _part(probe: Probe, simulation: RecordedSolids, name: str | None) -> Part:
 
 def _shape_functions(simulation: RecordedSolids, body: Any, X: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Particles of the body near X, (k,), and their shares, (k,), exact for linear fields."""
-    options = options_of_each(simulation.bodies, simulation.options)[body.name]
-    functions = shape_functions(X[None, :], body.x, body.volume, options.dilation * body.spacing, options.weight)
+    own = simulation.ranges[body.name]
+    weight = next(m.configuration.weight for m in simulation.stepper.media if own.start in m.span)
+    h = simulation.order.by_number(simulation.particles.h.numpy())[own.start : own.stop]
+    functions = shape_functions(X[None, :], body.x, body.volume, h, weight)
     if not functions.inside[0]:
         raise ValueError(
             f"probe {name!r}: X = {X.tolist()} m must lie in body {body.name!r}, whose particles lie in "

@@ -1,4 +1,4 @@
-"""Is the state still physical? One flag on the device, set by the first bad particle."""
+"""Is the state still physical? One flag on the device, set by the bad particle that is first in memory."""
 
 import functools
 from typing import Any
@@ -20,7 +20,7 @@ class UnstableError(RuntimeError):
     """A run met det F ≤ 0 or a non-finite value; the message names particle, position, time and remedies.
 
     Attributes:
-        particle: number of a bad particle, the first of them in memory.
+        particle: number of a bad particle, where it began as far as the state tells (``worst.py``), or the fastest.
         time: time [s] at the end of the last good step.
         step: number of steps taken, the bad one included.
     """
