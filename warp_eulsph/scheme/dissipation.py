@@ -124,10 +124,10 @@ def upwind_between(space: Space, sensed: bool) -> wp.Function:
 
 
 @functools.cache
-def _make_forces(space: Space, balanced: bool, sensed: bool, pressure: bool) -> wp.Kernel:
-    """Kernel: M5, between ``balanced`` positions (M13) or those of the particles, and M9; with ``pressure`` ∇_k p (M4).
+def _make_forces(space: Space, joined: bool, balanced: bool, sensed: bool, pressure: bool) -> wp.Kernel:
+    """Kernel, portable: M9; ``joined`` with M5, for both read the same of each pair, and with ``pressure`` ∇_k p (M4).
 
-    In one pass, for they read the same of each pair; portable.
+    M5 takes ``balanced`` positions (M13) or those of the particles.
     """
     real, vec, mat, row, rows_of_p = space.real, space.vec, space.mat, space.row(1), space.row_gradient(1)
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
@@ -160,9 +160,11 @@ def _make_forces(space: Space, balanced: bool, sensed: bool, pressure: bool) -> 
                 slope += xi * near.w[k] * (p[b][0] - p[a][0])
             if wp.static(balanced):
                 xi = separation(reference.balanced[b], reference.balanced[a], near.box)
-            force += (flux.Pi[a] + flux.Pi[b]) @ (xi * near.w[k])
-        internal[a] = force * reference.V[a]
+            if wp.static(joined):
+                force += (flux.Pi[a] + flux.Pi[b]) @ (xi * near.w[k])
         dissipation[a] = drag
+        if wp.static(joined):
+            internal[a] = force * reference.V[a]
         if wp.static(pressure):
             sums = rows_of_p()
             for i in range(wp.static(space.dim)):
@@ -190,10 +192,9 @@ class UpwindForces(Stabiliser):
         """The portable kernels do, the SIMD pass makes its own."""
         return not configuration.pairs_by_simd(sensed)
 
-    @property
-    def sums_pressure(self) -> bool:
-        """Along the pairs of M9, where M4 joins the same positions."""
-        return not self.balances
+    def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
+        """Where M9 comes with M5, and M4 joins the same positions."""
+        return not self.balances and configuration.simd == configuration.pairs_by_simd(sensed)
 
     def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
         """Internal force (M5) and dissipation (M9), and the gradient of p where it is asked for."""
@@ -204,7 +205,11 @@ class UpwindForces(Stabiliser):
         if not self.takes_dual(configuration, sensed):
             self._by_simd.compute(configuration, flux, x, v, sums.grad_v, sums.epsilon, forces, sums.grad_p)
             return
+        joined = not configuration.simd
+        if not joined:  # with a sensor, of which the SIMD pass does not know
+            configuration.divergence(flux.Pi, forces.internal)
         arguments = [configuration.fields, configuration.near, flux, x, v, sums.grad_v, sums.epsilon]
         arguments += [sums.sensor if sensed else v, sums.p if pressure else self._no_p]
         arguments += [forces.internal, forces.dissipation, sums.grad_p if pressure else self._no_gradient]
-        self._launch(_make_forces(self.space, self.balances, sensed, pressure), len(v), arguments)
+        kernel = _make_forces(self.space, joined, joined and self.balances, sensed, pressure)
+        self._launch(kernel, len(v), arguments)

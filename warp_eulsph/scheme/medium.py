@@ -175,7 +175,7 @@ class Medium:
         if self.exchanges:
             self.flux.keep_dissipated()
             self.volumes = VolumeFlux(self.space, self.flux, self.particles, own, self.device)
-            if self.stabiliser.sums_pressure:
+            if self.stabiliser.sums_pressure(self.configuration, self.sums.sensor is not None):
                 self.sums = replace(self.sums, p=self.volumes.p, grad_p=self.volumes.grad_p)
 
     def of(self, state: StateArrays) -> StateArrays:

@@ -73,8 +73,7 @@ class Stabiliser(ABC):
         """Whether ``compute``, with a sensor or without, takes Π from the array of the flux (M5)."""
         return True
 
-    @property
-    def sums_pressure(self) -> bool:
+    def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
         """Whether ``compute`` can sum ∇_k p with the forces, for M24."""
         return False
 
