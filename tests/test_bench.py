@@ -155,10 +155,11 @@ def test_many_runs_together_are_timed_beside_those_one_by_one(monkeypatch, capsy
         monkeypatch.setattr(many_runs, name, value)
     before = execution.threads()
     try:
-        many_runs.main(["--bars", "3"])
+        many_runs.main(["--bars", "3", "--independent"])
     finally:
         execution.set_threads(before)
-    assert "3 bars of 40 particles, 30 steps each" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "3 bars of 40 particles, 30 steps each" in printed and "as independent runs of one simulation" in printed
 
 
 def test_cost_of_contact_is_timed_beside_steps_without(monkeypatch, capsys):

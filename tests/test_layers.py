@@ -24,7 +24,8 @@ LAYERS = [
     {"operators", "memory", "geometry"},
     {"scheme", "interactions"},
     {"body", "overlap"},
-    {"progress", "diagnostics", "sorting", "arguments", "failure", "worst", "building", "settling", "defaults"},
+    {"progress", "diagnostics", "sorting", "arguments", "failure", "worst", "building", "settling", "defaults"}
+    | {"runs"},
     {"output"},  # below what it records, of which it knows protocols only
     {"simulation", "looks", "transport", "programs"},
     {"validation", "pictures", "bench"},

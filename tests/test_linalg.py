@@ -127,12 +127,12 @@ def test_powers_are_right(p, dtype):
 
 @functools.cache
 def _make_moved(space):
-    vec, mat, moved = space.vec, space.mat, moved_surface(space)
+    real, vec, mat, moved = space.real, space.vec, space.mat, moved_surface(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def move(s: wp.array(dtype=vec), F: wp.array(dtype=mat), F_new: wp.array(dtype=mat)):
         a = wp.tid()
-        s[a] = moved(s[a], F[a], F_new[a])
+        s[a] = moved(s[a], F[a], F_new[a], real(1.0))
 
     return move
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 import warp as wp
+from bodies import RUBBER
 from points import COPPER, HARDENINGS, KAPPA, MU
 
 import warp_eulsph as es
@@ -221,3 +222,13 @@ def test_a_mapping_that_does_not_converge_is_named():
     simulation = block(2, es.Always(), hardening=Falling())
     with pytest.raises(es.UnstableError, match=r"particle \d+ of body 'body' at x = .*no state that its material"):
         simulation.run(1e-5)
+
+
+def test_it_is_named_in_the_second_medium_too():
+    metal = block(2, es.Always(), hardening=Falling()).bodies[0]
+    rubber = es.Body(x=metal.x + 10.0, volume=metal.volume, material=RUBBER, dilation=1.2, name="before it")
+    simulation = es.Simulation([rubber, metal])
+    assert len(simulation.stepper.media) == 2
+    with pytest.raises(es.UnstableError, match=r"of body 'body' at x = .*no state that its material") as failed:
+        simulation.run(1e-5)
+    assert failed.value.particle >= len(rubber.x)

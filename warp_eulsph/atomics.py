@@ -42,3 +42,8 @@ def raise_at(real: type) -> wp.Function:
 @wp.func_native(_SNIPPET.format(name="min", type="int", better="<", place="target.data"))
 def lower_to(target: wp.array(dtype=wp.int32), value: wp.int32):
     """target[0] ← min(target[0], value)."""
+
+
+@wp.func_native(_SNIPPET.format(name="min", type="int", better="<", place="target.data + i"))
+def lower_at(target: wp.array(dtype=wp.int32), i: int, value: wp.int32):
+    """target[i] ← min(target[i], value)."""

@@ -25,10 +25,12 @@ def _make_momenta(space: Space) -> wp.Kernel:
     Particles, State, dim = structure(space, "Particles"), structure(space, "State"), space.dim
 
     @wp.kernel(module="unique", enable_backward=False)
-    def momenta(first: int, n: int, each: int, particles: Particles, state: State, out: wp.array(dtype=_Vec6)):
+    def momenta(
+        first: int, bounds: wp.array(dtype=wp.int32), particles: Particles, state: State, out: wp.array(dtype=_Vec6)
+    ):
         block = first + wp.tid()
         total = _Vec6()
-        for a in range(block * each, wp.min((block + 1) * each, n)):
+        for a in range(bounds[block], bounds[block + 1]):
             x = wp.vec3d()
             p = wp.vec3d()
             for i in range(wp.static(dim)):
@@ -208,14 +210,18 @@ class SectionForce:
 
 
 class Diagnostics:
-    """Sums and extrema over all particles of a state, and its volume ratios."""
+    """Sums and extrema over all particles of a state, and its volume ratios.
 
-    def __init__(self, space: Space, particles: ParticleArrays, device: wp.DeviceLike):
+    Args:
+        runs: particles of each run (``DeviceClock.sizes``).
+    """
+
+    def __init__(self, space: Space, particles: ParticleArrays, device: wp.DeviceLike, runs: Sequence[int]):
         self.space, self.particles, self.device = space, particles, device
         self._launch = Launcher(device)
-        self._total = wp.zeros(1, dtype=_Vec6, device=device)
+        self._total = wp.zeros(len(runs), dtype=_Vec6, device=device)
         self._extrema = [wp.zeros(1, dtype=space.real, device=device) for _ in range(3)]
-        self._sum = SumOfParticles(_Vec6, len(particles.mass), device)
+        self._sum = SumOfParticles(_Vec6, runs, device)
         self._mismatch = wp.zeros(0, dtype=space.real, device=device)
         self._largest = wp.zeros(1, dtype=space.real, device=device)
 
@@ -232,10 +238,10 @@ class Diagnostics:
         return self._mismatch, float(self._largest.numpy()[0])
 
     def momenta(self, state: StateArrays) -> tuple[np.ndarray, np.ndarray]:
-        """Linear [kg m/s] and angular momentum about the origin [kg m²/s], both padded to (3,)."""
+        """Linear [kg m/s] and angular momentum about the origin [kg m²/s] of each run, both padded to (runs, 3)."""
         self._sum(_make_momenta(self.space), [self.particles, state], self._total)
-        total = self._total.numpy()[0].copy()
-        return total[:3], total[3:]
+        total = self._total.numpy().copy()
+        return total[:, :3], total[:, 3:]
 
     def extrema(self, state: StateArrays) -> tuple[float, float, float]:
         """Least and largest det F [-], and largest speed [m/s]."""

@@ -1,7 +1,7 @@
 """When a run has failed, and what the user is told: a bad particle, a step that vanished, energy that a step made."""
 
 import logging
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -51,40 +51,79 @@ class Failing(Bad, Protocol):
         """What materials remember under this name, by number."""
 
 
+class Cause(NamedTuple):
+    """Why a run has ended: a particle, words on what it has, and what to try."""
+
+    particle: int
+    what: str
+    remedy: str
+
+
 def failure(simulation: Failing) -> UnstableError | None:
-    """What is wrong with the present state of a ``Simulation``, None while all is well; reads the device."""
-    place, dt = simulation.clock.bad, simulation.clock.free_dt
-    step = f"a shorter step than {fixed:g} s" if (fixed := simulation.clock.option.fixed) else "a smaller cfl"
-    remedy = f"try {step}, a finer resolution or a limiter"
+    """What is wrong with a ``Simulation`` that has one clock, None while all is well; reads the device."""
+    place, dt, everyone = simulation.clock.bad, simulation.clock.free_dt, range(simulation.stepper.n)
     if place is not None:
-        particle, what = _worst(simulation, place)
-        material = body_of(simulation, particle).material
-        if material.flows:
-            remedy = f"try {step} or a finer resolution"
-        if material.liquid:
-            remedy += ", or stiffer matter: a sound_speed of 10 times the largest speed of the flow"
+        cause = found_bad(simulation, place, everyone)
     elif dt < STALLED * simulation.clock.longest_dt:
-        particle = _fastest(simulation)
-        what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
+        cause = stalled(simulation, dt, everyone)
     elif simulation.steps > SETTLING and (made := simulation.stepper.ledger.made()) > MADE:
-        particle = _fastest(simulation)
-        what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
-        remedy = f"cfl is {simulation.clock.cfl:g}, {type(simulation.stepper.options).cfl:g} is the scheme's own"
+        cause = gained(simulation, made, everyone)
     else:
-        _look_for_failed(simulation)
-        return _look_for_tears(simulation)
+        return look_at_matter(simulation)
+    return unstable(simulation, cause, simulation.t, simulation.steps)
+
+
+def unstable(simulation: Failing, cause: Cause, time: float, step: int) -> UnstableError:
+    """The error of a run that ended at ``time`` [s] after ``step`` steps."""
     return UnstableError(
-        f"unstable at t = {simulation.t:.8g} s, step {simulation.steps}: particle {particle} "
-        f"{where(simulation, particle)} has {what}; {last_good(simulation.output)}; {remedy}",
-        particle,
-        simulation.t,
-        simulation.steps,
+        f"unstable at t = {time:.8g} s, step {step}: particle {cause.particle} "
+        f"{where(simulation, cause.particle)} has {cause.what}; {last_good(simulation.output)}; {cause.remedy}",
+        cause.particle,
+        time,
+        step,
     )
 
 
-def _worst(simulation: Failing, place: int) -> tuple[int, str]:
+def found_bad(simulation: Failing, place: int, among: range) -> Cause:
+    """That the particle at ``place``, of a run of the particles ``among``, was found bad."""
+    particle, what = _worst(simulation, place, among)
+    step, remedy = _remedies(simulation)
+    material = body_of(simulation, particle).material
+    if material.flows:
+        remedy = f"try {step} or a finer resolution"
+    if material.liquid:
+        remedy += ", or stiffer matter: a sound_speed of 10 times the largest speed of the flow"
+    return Cause(particle, what, remedy)
+
+
+def stalled(simulation: Failing, dt: float, among: range) -> Cause:
+    """That the step of a run of the particles ``among`` fell to ``dt`` [s]."""
+    what = f"the highest wave speed, and the time step fell to {dt:.3g} s, {STALLED:g} of the longest"
+    return Cause(_fastest(simulation, among), what, _remedies(simulation)[1])
+
+
+def gained(simulation: Failing, made: float, among: range) -> Cause:
+    """That the steps of a run of the particles ``among`` made this share of its energy."""
+    what = f"the highest wave speed, and the steps have made {100.0 * made:.3g} % of the most energy there was"
+    own = type(simulation.stepper.options).cfl
+    return Cause(_fastest(simulation, among), what, f"cfl is {simulation.clock.cfl:g}, {own:g} is the scheme's own")
+
+
+def _remedies(simulation: Failing) -> tuple[str, str]:
+    """A shorter step, in words, and all that may help."""
+    step = f"a shorter step than {fixed:g} s" if (fixed := simulation.clock.option.fixed) else "a smaller cfl"
+    return step, f"try {step}, a finer resolution or a limiter"
+
+
+def look_at_matter(simulation: Failing) -> UnstableError | None:
+    """Note and log, once each, the first matter that failed by its law and the first tear, an error if it ends all."""
+    _look_for_failed(simulation)
+    return _look_for_tears(simulation)
+
+
+def _worst(simulation: Failing, place: int, among: range) -> tuple[int, str]:
     """The particle that is named, and words on what it has and how many are bad."""
-    particle, J, finite, bad = worst_of(simulation, place)
+    particle, J, finite, bad = worst_of(simulation, place, among)
     F = f"F = {simulation.F[particle].tolist()}"
     if J <= 0.0 and body_of(simulation, particle).material.forgets:  # which made 0 of whatever J was
         what = "no volume left, its J = det F went from positive to zero or below in this step"
@@ -94,7 +133,7 @@ def _worst(simulation: Failing, place: int) -> tuple[int, str]:
         what = f"no state that its material allows, {_history(simulation, particle)}, {F}"
     else:
         what = f"non-finite values, v = {simulation.v[particle]}, {F}"
-    n = len(simulation.order.places)
+    n = len(among)
     if bad == n > 1:
         what += f"; all {n} particles are bad, as when steps are too long or units do not fit"
     elif bad > 1:
@@ -176,6 +215,7 @@ def _history(simulation: Failing, particle: int) -> str:
     return ", ".join(f"{name} = {simulation.history(name)[particle].tolist()}" for name in sorted(names))
 
 
-def _fastest(simulation: Failing) -> int:
+def _fastest(simulation: Failing, among: range) -> int:
+    """The particle ``among`` these with the highest wave speed."""
     speeds = [medium.flux.fields.speed.numpy() for medium in simulation.stepper.media]
-    return int(simulation.order.by_number(np.concatenate(speeds)).argmax())
+    return among.start + int(simulation.order.by_number(np.concatenate(speeds))[among].argmax())

@@ -159,14 +159,18 @@ def neighbour_structure(space: Space) -> Any:
 
 @functools.cache
 def clock_structure(space: Space) -> Any:
-    """Time on the device, so that a recorded step stays valid: arrays of one element.
+    """Time on the device, so that a recorded step stays valid: arrays of one element for each run that has a clock.
+
+    The run of particle a is ``run[a]``, 0 where all share one clock; a medium's arrays begin ``first`` particles on.
 
     ``t`` [s] time, ``dt`` [s] step, ``free_dt`` [s] last step that no output time shortened, ``longest_dt`` [s] the
-    longest of these, ``target`` [s] time that must be hit, ``look`` [s] time from which on the host looks, ``rate``
+    longest of these, ``target`` [s] time that all must hit, ``look`` [s] time from which on the host looks, ``rate``
     [1/s] largest wave speed over spacing, or rate of strain that asks for as short a step, ``frequency`` [1/s] what a
     condition asks for (``Bound.limit``) and ``added`` [1/s²] the sum of all their (½ frequency)², ``bad`` place of the
-    first unphysical particle; of a batch of recorded steps ``running``, 0 when the rest is not to be taken, and
-    ``taken``, steps so far.
+    first unphysical particle, below 0 where the host knows of it; of a batch of recorded steps ``running``, 0 when the
+    rest is not to be taken, and ``taken``, steps so far, both of one element. Of runs that are independent ``steps``
+    taken and ``lag``, steps of others in which they waited, until it is a multiple of ``every``, which is 0 where all
+    share one clock.
     """
 
     @wp.struct
@@ -183,5 +187,10 @@ def clock_structure(space: Space) -> Any:
         bad: wp.array(dtype=wp.int32)
         running: wp.array(dtype=wp.int32)
         taken: wp.array(dtype=wp.int32)
+        steps: wp.array(dtype=wp.int32)
+        lag: wp.array(dtype=wp.int32)
+        run: wp.array(dtype=wp.int32)
+        first: int
+        every: int
 
     return Clock

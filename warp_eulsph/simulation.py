@@ -13,13 +13,14 @@ from .building import Given, check_neighbourhoods, make_particles, make_state, p
 from .checks import check_restorable, checked_box, objects, real_number, whole_number
 from .diagnostics import Diagnostics
 from .execution import graphs
-from .failure import failure
+from .failure import failure, look_at_matter
 from .interactions import Interaction
 from .looks import Looks
 from .memory import check_memory
 from .order import Order
 from .overlap import Encounters
 from .progress import Bar
+from .runs import Runs, check_independent, runs_of
 from .schedule import AtTimes, EveryTime, Schedule, next_target
 from .scheme.arrangement import Arrangement, Convected
 from .scheme.base import Scheme
@@ -59,6 +60,8 @@ class Simulation(Looks):
         periodic: lengths [m] of a periodic box with a corner at the origin, (dim,), 0 where open; None is open.
         dtype: ``wp.float64`` or ``wp.float32``.
         device: Warp device name; the default device if None.
+        independent: every body, with those bonded to it, is a run with steps, time, ledger and end of its own
+            (``runs``). Times to hit are hit by all; ``t`` is where all are that have not failed, and sums are of those.
         sort: keep particles sorted in memory, so that steps do not slow down as they move; False is for comparisons.
             Results come in the order of the bodies' particles either way; for arrays on the device see ``order``.
 
@@ -83,6 +86,7 @@ class Simulation(Looks):
         periodic: Sequence[float] | None = None,
         dtype: type = wp.float64,
         device: wp.DeviceLike = None,
+        independent: bool = False,
         sort: bool = True,
     ):
         self.bodies = checked_bodies(objects(bodies, Body, "bodies", "Body(...)"))
@@ -107,9 +111,14 @@ class Simulation(Looks):
         self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
         self.bound_interactions = [interaction.bind(assembly) for interaction in self.interactions]
         touching = {two for interaction in self.bound_interactions for two in interaction.touching}
-        self.encounters = Encounters(self.bodies, self.particles.share.numpy() == 0.0, box, touching)
+        unmet = (self.particles.share.numpy() == 0.0) | independent
+        self.encounters = Encounters(self.bodies, unmet, box, touching)
         warn(self.bodies, self.encounters, self.space.real)
-        self.clock = DeviceClock(self.space, time_step, first.scheme.cfl, self.device)
+        runs, every = runs_of(self.bodies, independent), 0
+        sizes = [sum(len(body.x) for body in together) for together in runs]
+        if independent:
+            every = check_independent(media, self.conditions, self.interactions)
+        self.clock = DeviceClock(self.space, time_step, first.scheme.cfl, self.device, sizes, every)
         self.stepper = first.scheme.build(
             Parts(
                 space=self.space,
@@ -125,7 +134,8 @@ class Simulation(Looks):
         self.sorting = Sorting(self.stepper, self.order, sort)
         self._graphs: StepGraphs | None = None
         self.by_graphs = graphs(self.device, len(X)) and recordable(self.stepper)
-        self.diagnostics = Diagnostics(self.space, self.particles, self.device)
+        self.diagnostics = Diagnostics(self.space, self.particles, self.device, sizes)
+        self.runs = Runs(self, self.diagnostics, runs)
         self.whole = Whole()
         self.tear: UnstableError | None = None  # the first time that a solid came apart without a law of failure
         self.broken: str | None = None  # words on the first particle that failed by its law
@@ -224,7 +234,7 @@ class Simulation(Looks):
             else:
                 limits = (STEPS_BETWEEN_LOOKS, most, self.sorting.steps_left(self.steps))
                 self._graphs.take(min(limit for limit in limits if limit is not None))
-            unstable = failure(self)
+            unstable = failure(self) if not self.clock.independent else self.runs.look() or look_at_matter(self)
             if unstable is None:
                 self.sorting.look_after(self.steps)
         if unstable is not None:
@@ -254,11 +264,13 @@ class Simulation(Looks):
             for name, array in self.evolving().items():
                 array.assign(arrays[name])
             self.stepper.steps = int(counters["steps"])
-            self.stepper.ledger.start = counters["start"]
-            self.clock.fields.longest_dt.fill_(counters["longest_dt"])
+            if not self.clock.independent:
+                self.stepper.ledger.start = counters["start"]
+                self.clock.fields.longest_dt.fill_(counters["longest_dt"])
             self.stepper.rebuild()
             if self._graphs is not None and self.whole.broken is not None:
                 self._graphs = StepGraphs(self.stepper)  # what broke in may have cut a recording short
+        self.runs.recall()
         self.whole.mend()
 
     # what a user looks at
@@ -346,12 +358,11 @@ class Simulation(Looks):
 
     def momentum(self) -> np.ndarray:
         """Linear momentum [kg m/s], (dim,)."""
-        return self.diagnostics.momenta(self.stepper.U)[0][: self.space.dim]
+        return self.runs.momentum()[self.clock.well].sum(axis=0)
 
     def angular_momentum(self) -> np.ndarray:
         """Angular momentum about the origin [kg m²/s]: (3,) in 3-D, (1,) about z in 2-D, (0,) in 1-D."""
-        about = self.diagnostics.momenta(self.stepper.U)[1]
-        return {1: about[:0], 2: about[2:], 3: about}[self.space.dim]
+        return self.runs.angular_momentum()[self.clock.well].sum(axis=0)
 
     def reaction(self, boundary: Boundary) -> np.ndarray:
         """Force [N] that a velocity condition exerted on its particles, mean over the last step, (dim,)."""

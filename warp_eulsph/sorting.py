@@ -43,8 +43,7 @@ def _make_count_parted(space: Space) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def count_parted(
         first: int,
-        n: int,
-        each: int,
+        bounds: wp.array(dtype=wp.int32),
         places: wp.array(dtype=wp.int32),
         particles: Particles,
         reference: Reference,
@@ -53,7 +52,7 @@ def _make_count_parted(space: Space) -> wp.Kernel:
     ):
         block = first + wp.tid()
         count = int(0)
-        for i in range(block * each, wp.min((block + 1) * each, n)):
+        for i in range(bounds[block], bounds[block + 1]):
             a = places[i]
             b = places[i + 1]
             spacing = spacing_of(a, particles, reference)
@@ -71,7 +70,7 @@ class _CountParted:
     def __init__(self, medium: Medium):
         self.medium, device = medium, medium.device
         self._places, self._count = (wp.zeros(k, dtype=wp.int32, device=device) for k in (medium.n, 1))
-        self._sum = SumOfParticles(wp.int32, medium.n - 1, device)
+        self._sum = SumOfParticles(wp.int32, [medium.n - 1], device)
 
     def __call__(self, places: np.ndarray | None) -> int:
         """How many there are, or were they at these places of the world, (n,); reads the device."""

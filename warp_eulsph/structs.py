@@ -87,7 +87,7 @@ class NeighbourRows(Protocol):
 
 
 class ClockArrays(Protocol):
-    """Struct ``Clock``: arrays of one element."""
+    """Struct ``Clock``: arrays of one element per run, but for ``run``, of one per particle."""
 
     t: wp.array
     dt: wp.array
@@ -101,3 +101,8 @@ class ClockArrays(Protocol):
     bad: wp.array
     running: wp.array
     taken: wp.array
+    steps: wp.array
+    lag: wp.array
+    run: wp.array
+    first: int
+    every: int

@@ -47,25 +47,26 @@ class Worst(NamedTuple):
     bad: int
 
 
-def worst_of(simulation: Bad, place: int) -> Worst:
+def worst_of(simulation: Bad, place: int, among: range) -> Worst:
     """The particle of the least det F that is not positive, the fastest of several; else the middle of what is lost.
 
     What is not finite spreads by sums over neighbours, so the middle is of that where fewest particles have lost it: F,
-    v, x or what their law remembers. Where none of this is bad it is the one at ``place``, which was found bad.
+    v, x or what their law remembers. Where none of this is bad it is the one at ``place``, which was found bad. All
+    this is of the particles ``among`` which it is, those of one run.
     """
-    x, v, F = simulation.x, simulation.v, simulation.F
+    x, v, F = simulation.x[among], simulation.v[among], simulation.F[among]
     lost = [~np.isfinite(values).reshape(len(x), -1).all(axis=1) for values in (F, v, x)]
-    without, below = _without_state(simulation)
+    without, below = (which[among] for which in _without_state(simulation))
     with np.errstate(over="ignore", invalid="ignore"):
         J, speed = np.linalg.det(np.where(lost[0][:, None, None], np.nan, F)), np.linalg.norm(v, axis=1)
-    finite, flat, found = ~np.any(lost, axis=0), J <= 0.0, simulation.order.ids.numpy()[place] == np.arange(len(x))
+    finite, flat, found = ~np.any(lost, axis=0), J <= 0.0, simulation.order.ids.numpy()[place] == np.array(among)
     bad = np.any([*lost, without, below, flat, found], axis=0)
     if flat.any():
         particle = int(np.lexsort((-speed, J))[0])
     else:
         lost = [each for each in [*lost, without] if each.any()] or [below if below.any() else found]
-        particle = _middle(np.where(np.isfinite(x), x, simulation.X), min(lost, key=np.sum))
-    return Worst(particle, float(J[particle]), bool(finite[particle]), int(bad.sum()))
+        particle = _middle(np.where(np.isfinite(x), x, simulation.X[among]), min(lost, key=np.sum))
+    return Worst(among[particle], float(J[particle]), bool(finite[particle]), int(bad.sum()))
 
 
 def _without_state(simulation: Bad) -> tuple[np.ndarray, np.ndarray]:

@@ -1,14 +1,15 @@
 """Many small runs: bars of 40 particles one after another, and as the bodies of one simulation.
 
-    python -m warp_eulsph.bench.many_runs            python -m warp_eulsph.bench.many_runs --bars 200
+    python -m warp_eulsph.bench.many_runs            python -m warp_eulsph.bench.many_runs --bars 200 --independent
 
-Each bar has a modulus of its own, as in a study of parameters. One thread; both ways are timed in turns.
+Each bar has a modulus of its own, as in a study of parameters. One thread; all ways are timed in turns.
 """
 
 import argparse
+import functools
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import warp as wp
@@ -38,39 +39,50 @@ def _seconds(action: Callable[[], object]) -> float:
     return time.process_time() - start
 
 
-def measure(bars: int) -> tuple[float, float]:
-    """Processor seconds of all runs of ``STEPS`` steps, one after another and as one simulation, to build included."""
+def measure(bars: int, independent: Sequence[bool]) -> list[float]:
+    """Processor seconds of all runs of ``STEPS`` steps, one after another and as one simulation, ``independent`` or
+    not, to build included."""
 
     def alone() -> None:
         for k in range(ALONE):
             Simulation(bar(k), reference=Never()).step(STEPS)
 
-    def build() -> Simulation:
-        return Simulation([bar(k) for k in range(bars)], reference=Never())
+    def build(apart: bool, count: int = bars) -> Simulation:
+        return Simulation([bar(k) for k in range(count)], reference=Never(), independent=apart)
+
+    def take(world: Simulation) -> None:
+        world.step(TOGETHER)
 
     Simulation(bar(0), reference=Never()).step(20)  # compiles
-    Simulation([bar(0), bar(1)], reference=Never()).step(20)
-    built, world = _seconds(build), build()
-    world.step(3)
-    one, together = [], []
+    for apart in independent:
+        build(apart, 2).step(20)
+    built = [_seconds(functools.partial(build, apart)) for apart in independent]
+    worlds = [build(apart) for apart in independent]
+    for world in worlds:
+        world.step(3)
+    found = []
     for _ in range(ROUNDS):
-        one.append(_seconds(alone) / ALONE * bars)
-        together.append(built + _seconds(lambda: world.step(TOGETHER)) / TOGETHER * STEPS)
-    return statistics.median(one), statistics.median(together)
+        taken = [_seconds(functools.partial(take, world)) / TOGETHER * STEPS for world in worlds]
+        found.append([_seconds(alone) / ALONE * bars, *map(sum, zip(built, taken, strict=True))])
+    return [statistics.median(each) for each in zip(*found, strict=True)]
 
 
 def main(argv: list[str] | None = None) -> None:
     """Print both and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bars", type=int, default=1000, help="how many (1000)")
-    bars = parser.parse_args(argv).bars
+    parser.add_argument("--independent", action="store_true", help="as runs with clocks and ledgers of their own too")
+    given = parser.parse_args(argv)
+    bars = given.bars
     wp.config.log_level = wp.LOG_WARNING
     execution.set_threads(1)
-    one, together = measure(bars)
+    one, together, *apart = measure(bars, (False, True) if given.independent else (False,))
     print(
         f"{bars} bars of {PARTICLES} particles, {STEPS} steps each: {one:.1f} processor seconds one after another, "
         f"{together:.1f} as one simulation, {one / together:.1f} times less"
     )
+    for seconds in apart:
+        print(f"as independent runs of one simulation: {seconds:.1f}, {one / seconds:.1f} times less")
 
 
 if __name__ == "__main__":

@@ -147,6 +147,8 @@ class Bound:
             repeat them.
         sortable: whether particles may be sorted in memory: it finds them by arrays of ``Assembly.order.places_of``,
             what it holds for all of them comes from ``Assembly.order.carry``, the rest goes by ``indices``.
+        independent: whether it can do with bodies that are runs of their own: it takes time and step of particle a from
+            ``clock.t`` and ``clock.dt`` at ``clock.run[a]``, asks for steps there, and sums nothing over several runs.
         steady: whether ``impose`` sets velocities only, by a rule that is the same at all times and places, and linear:
             of two velocities that obey it the mean does too. Then a step takes one velocity gradient instead of two.
     """
@@ -154,6 +156,7 @@ class Bound:
     indices: np.ndarray
     recordable: bool = False
     sortable: bool = False
+    independent: bool = False
     steady: bool = False
 
     @property
@@ -194,8 +197,9 @@ class Bound:
     def limit(self, state: StateArrays, clock: ClockArrays) -> None:
         """Ask for a shorter step, before it is chosen, for what ``load`` may do in it.
 
-        Raise ``clock.frequency[0]`` to the highest angular frequency [1/s] of a particle under these forces alone:
-        √(k/m) for a stiffness k [N/m], a damper's rate c/m. It counts whether they act now or begin to in the step.
+        Raise ``clock.frequency[0]``, where it is ``independent`` that at ``clock.run[a]``, to the highest angular
+        frequency [1/s] of a particle under these forces alone: √(k/m) for a stiffness k [N/m], a damper's rate c/m. It
+        counts whether they act now or begin to in the step.
         """
 
     def evolving(self) -> dict[str, wp.array]:

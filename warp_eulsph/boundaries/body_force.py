@@ -64,7 +64,7 @@ class BoundBodyForce(Bound):
         self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
-        self.recordable = self.values.recordable
+        self.recordable = self.independent = self.values.recordable
         self.X: wp.array | None = None
         if condition.material:
             self.X = assembly.order.carry(assembly.X, self.space.vec)

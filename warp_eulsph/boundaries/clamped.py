@@ -81,6 +81,7 @@ class BoundClamped(Bound):
 
     recordable = True
     sortable = True
+    independent = True
     steady = True
 
     def __init__(self, condition: Clamped, assembly: Assembly):

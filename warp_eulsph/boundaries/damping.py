@@ -51,32 +51,33 @@ class Damping(Boundary):
 
 @functools.cache
 def _make_quotient(space: Space) -> wp.Kernel:
-    """Kernel of ``SumOfParticles``: −Δx·Δf and m Δx² since the last call, f the forces of the material."""
+    """Kernel of ``SumOfParticles``: −Δx·Δf and m Δx² since the last step, f the forces of the material."""
     vec, Particles, State, Forces = space.vec, *(structure(space, name) for name in ("Particles", "State", "Forces"))
-    precise, pair = vector_type(space.dim, wp.float64), wp.vec2d
+    Clock, precise, pair = clock_structure(space), vector_type(space.dim, wp.float64), wp.vec2d
 
     @wp.kernel(module="unique", enable_backward=False)
     def quotient(
         first: int,
-        n: int,
-        each: int,
+        bounds: wp.array(dtype=wp.int32),
         places: wp.array(dtype=wp.int32),
         particles: Particles,
         state: State,
         forces: Forces,
+        clock: Clock,
         x: wp.array(dtype=vec),
         f: wp.array(dtype=vec),
         out: wp.array(dtype=pair),
     ):
         block = first + wp.tid()
         total = pair()
-        for k in range(block * each, wp.min((block + 1) * each, n)):
+        for k in range(bounds[block], bounds[block + 1]):
             a = places[k]
-            force = forces.internal[a] + forces.correction[a] + forces.tie[a]
-            dx, df = precise(state.x[a] - x[k]), precise(force - f[k])
-            total += pair(-wp.dot(dx, df), wp.float64(particles.mass[a]) * wp.dot(dx, dx))
-            x[k] = state.x[a]
-            f[k] = force
+            if clock.dt[clock.run[a]] > wp.float64(0.0):
+                force = forces.internal[a] + forces.correction[a] + forces.tie[a]
+                dx, df = precise(state.x[a] - x[k]), precise(force - f[k])
+                total += pair(-wp.dot(dx, df), wp.float64(particles.mass[a]) * wp.dot(dx, dx))
+                x[k] = state.x[a]
+                f[k] = force
         out[block] = total
 
     return quotient
@@ -111,8 +112,9 @@ def _make_damp(space: Space) -> wp.Kernel:
     ):
         a = places[first + wp.tid()]
         c = rate[0]
-        if clock.dt[0] > wp.float64(0.0):
-            c = wp.min(c, wp.float64(wp.static(MOST)) / clock.dt[0])
+        dt = clock.dt[clock.run[a]]
+        if dt > wp.float64(0.0):
+            c = wp.min(c, wp.float64(wp.static(MOST)) / dt)
         force = -state.v[a] * (real(c) * particles.mass[a])
         forces.damping[a] = forces.damping[a] + force
         forces.external[a] = forces.external[a] + force
@@ -132,12 +134,13 @@ class BoundDamping(Bound):
         self._launch = Launcher(assembly.device)
         self.follows = condition.rate is None
         self.indices = assembly.select(None, condition.body, "Damping")
+        self.independent = not self.follows or condition.body is not None
         self._places = assembly.order.places_of(self.indices)
         n = len(self.indices)
         self._rate = wp.full(1, condition.rate or 0.0, dtype=wp.float64, device=self.device)
         self._x, self._f = (wp.zeros(n if self.follows else 0, dtype=self.space.vec, device=self.device) for _ in "xf")
         self._sums = wp.zeros(1, dtype=wp.vec2d, device=self.device)
-        self._sum = SumOfParticles(wp.vec2d, n, self.device)
+        self._sum = SumOfParticles(wp.vec2d, [n], self.device)
 
     def start(self, state: StateArrays) -> None:
         if self.follows:
@@ -145,7 +148,7 @@ class BoundDamping(Bound):
 
     def damp(self, state: StateArrays, clock: ClockArrays, forces: ForceArrays) -> None:
         if self.follows:
-            arguments = [self._places, self.particles, state, forces, self._x, self._f]
+            arguments = [self._places, self.particles, state, forces, clock, self._x, self._f]
             self._sum(_make_quotient(self.space), arguments, self._sums)
             self._launch.once(_make_follow(), 1, [self._sums, self._rate])
         arguments = [self._places, self.particles, state, clock, self._rate, forces]

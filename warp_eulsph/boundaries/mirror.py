@@ -198,6 +198,7 @@ class BoundMirrorGhosts(Bound):
 
     recordable = True
     sortable = True
+    independent = True
 
     def __init__(self, condition: MirrorGhosts, assembly: Assembly):
         self.space, self.device, self.image = assembly.space, assembly.device, condition.image

@@ -52,8 +52,10 @@ def _make_impose(space: Space) -> wp.Kernel:
         v: wp.array(dtype=vec),
     ):
         k = first + wp.tid()
-        if clock.dt[0] > wp.float64(0.0):
-            v[indices[k]] = (after[k] - before[k]) / real(clock.dt[0])
+        a = indices[k]
+        dt = clock.dt[clock.run[a]]
+        if dt > wp.float64(0.0):
+            v[a] = (after[k] - before[k]) / real(dt)
 
     return impose
 
@@ -77,7 +79,7 @@ class BoundMotion(Bound):
         self.before, self.after = (
             Value(assembly, self.indices, self.space.dim, condition.displacement, who) for _ in range(2)
         )
-        self.recordable = self.before.recordable
+        self.recordable = self.independent = self.before.recordable
 
     def impose(self, state: StateArrays, clock: ClockArrays, fraction: float) -> None:
         before = self.before.at(self.X, clock, fraction - 0.5)

@@ -103,7 +103,7 @@ class BoundPressure(Bound):
         self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, 1, condition.value, who)
-        self.recordable = self.values.recordable
+        self.recordable = self.independent = self.values.recordable
 
     def load(self, state: StateArrays, clock: ClockArrays, fraction: float, external: wp.array) -> None:
         values = self.values.at(state.x, clock, fraction)

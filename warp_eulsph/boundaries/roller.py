@@ -47,6 +47,7 @@ class BoundRoller(Bound):
 
     recordable = True
     sortable = True
+    independent = True
     steady = True
 
     def __init__(self, condition: Roller, assembly: Assembly):

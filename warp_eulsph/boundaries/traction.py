@@ -82,7 +82,7 @@ class BoundTraction(Bound):
         self.normal = unit_vector(condition.normal, self.space.dim, who)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
-        self.recordable = self.values.recordable
+        self.recordable = self.independent = self.values.recordable
 
     def start(self, state: StateArrays) -> None:
         face = faces_along(self.assembly, state, self.indices, self.condition.body, self.normal, "Traction")

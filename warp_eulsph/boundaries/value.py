@@ -29,8 +29,10 @@ def _make_evaluate(space: Space, components: int, function: Any) -> wp.Kernel:
         out: wp.array(dtype=value),
     ):
         k = first + wp.tid()
-        t = clock.t[0] + fraction * clock.dt[0]
-        out[k] = value(function(x[indices[k]], real(t)))
+        a = indices[k]
+        run = clock.run[a]
+        t = clock.t[run] + fraction * clock.dt[run]
+        out[k] = value(function(x[a], real(t)))
 
     return evaluate
 

@@ -67,7 +67,8 @@ class BoundVelocity(Bound):
         self._launch = Launcher(assembly.device)
         self.indices = assembly.select(condition.region, condition.body, who)
         self.values = Value(assembly, self.indices, self.space.dim, condition.value, who)
-        self.recordable, self.steady = self.values.recordable, self.values.function is None
+        self.recordable = self.independent = self.values.recordable
+        self.steady = self.values.function is None
         axes = range(self.space.dim) if condition.axes is None else condition.axes
         known = range(self.space.dim)
         if not isinstance(axes, Iterable):

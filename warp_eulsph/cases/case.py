@@ -133,6 +133,7 @@ class Case(Problem):
     settle: Number | None = Field(
         None, gt=0.0, description="end when in equilibrium to this residual; needs the condition Damping"
     )
+    independent: bool = Field(False, description="every body is a run with clock, ledger and end of its own")
     sort: bool = Field(True, description="keep particles sorted in memory; false is for comparisons")
     output: SolidsOutput = Field({}, validate_default=True)  # type: ignore[arg-type]
     probe: list[choice(Probe)] = Field([], description="what goes to tables of its own; boundary counts from 0")  # type: ignore
@@ -174,6 +175,7 @@ class Case(Problem):
             periodic=self.periodic,
             dtype=PRECISIONS[self.precision],
             device=self.device,
+            independent=self.independent,
             sort=self.sort,
         )
 

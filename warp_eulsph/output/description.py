@@ -65,6 +65,7 @@ def _solids(simulation: RecordedSolids) -> dict[str, Any]:
         "time_step": plain(simulation.clock.option),
         "dilation": simulation.dilation,
         "sort": simulation.sorting.on,
+        **({"independent": True} if simulation.clock.independent else {}),
         "bodies": {body.name: _body(body, options[body.name], first) for body in simulation.bodies},
         "boundaries": {
             str(i): {**plain(boundary), "particles": plain(condition.indices)}

@@ -46,6 +46,7 @@ SOURCES: dict[str, Callable[[Any], wp.array | np.ndarray]] = {
     "h": lambda simulation: simulation.particles.h,
     "X": lambda simulation: simulation.X,
     "force": lambda simulation: simulation.force,
+    "run_time": lambda simulation: np.repeat(simulation.runs.t, simulation.clock.sizes),
     "interaction_force": lambda simulation: simulation.interaction_force,
     "energy_density": lambda simulation: simulation.strain_energy_density,
     "mismatch": lambda simulation: simulation.mismatch,
@@ -83,6 +84,13 @@ FIELDS = {
         lambda x, h, J: h * np.clip(J ** (1.0 / x.shape[1]), LEAST_GROWTH, LARGEST_GROWTH),
     ),
     "particle": SnapshotField(lambda d: (), "-", "number of the particle in the simulation", ("particle",)),
+    "run_time": SnapshotField(
+        lambda d: (),
+        "s",
+        "time that the run of the particle has reached, less than the frame's where it failed",
+        ("run_time",),
+        default=False,
+    ),
     "displacement": SnapshotField(
         lambda d: (d,), "m", "displacement since the start", ("x", "X"), lambda x, X: x - X, default=False
     ),

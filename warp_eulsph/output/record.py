@@ -340,7 +340,10 @@ class _Recorder:
 
     def _note_status(self, state: str, until: float, reason: str | None = None) -> None:
         simulation = self.simulation
-        content = {"state": state, "reason": reason, "until": until, "step": simulation.steps, "t": simulation.t}
+        content: dict[str, Any] = {"state": state, "reason": reason, "until": until}
+        content |= {"step": simulation.steps, "t": simulation.t}
+        if solids(simulation) and any(simulation.runs.failures):
+            content["ended"] = [str(error) for error in simulation.runs.failures if error is not None]
         try:
             self.home.write(self.home.status, content)
         except OSError as error:  # the run's own error matters more

@@ -13,6 +13,7 @@ from ..building import Given
 from ..diagnostics import Diagnostics
 from ..interactions import BoundInteraction, Interaction
 from ..order import Order
+from ..runs import Runs
 from ..scheme.arrangement import Arrangement
 from ..scheme.policy import ReferencePolicy
 from ..scheme.reference import Configuration
@@ -82,6 +83,7 @@ class RecordedSolids(Recorded, Protocol):
     clock: DeviceClock
     diagnostics: Diagnostics
     sorting: Sorting
+    runs: Runs
     bodies: list[Body]
     boundaries: tuple[Boundary, ...]
     conditions: list[Bound]

@@ -22,8 +22,7 @@ def _make_work(space: Space) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def work(
         first: int,
-        n: int,
-        each: int,
+        bounds: wp.array(dtype=wp.int32),
         particles: Particles,
         state: State,
         v_old: wp.array(dtype=vec),
@@ -33,7 +32,7 @@ def _make_work(space: Space) -> wp.Kernel:
     ):
         block = first + wp.tid()
         total = wide(0.0)
-        for a in range(block * each, wp.min((block + 1) * each, n)):
+        for a in range(bounds[block], bounds[block + 1]):
             v_mean = wide(0.5) * (precise(v_old[a]) + precise(state.v[a]))
             total += wide(particles.share[a]) * wp.dot(precise(forces[a]), v_mean)
         out[block] = total * clock.dt[0]
@@ -84,7 +83,7 @@ class Exchanges:
         self._launch = Launcher(device)
         self._works, self._start = (wp.zeros(len(exchanges), dtype=wp.float64, device=device) for _ in range(2))
         self._step = wp.zeros(1, dtype=wp.float64, device=device)
-        self._sum = SumOfParticles(wp.float64, len(particles.mass), device)
+        self._sum = SumOfParticles(wp.float64, [len(particles.mass)], device)
 
     def open(self) -> None:
         """Start the books."""

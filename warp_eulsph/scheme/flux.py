@@ -74,6 +74,10 @@ class Flux:
         if not len(self.fields.dissipated):
             self.fields.dissipated = wp.zeros_like(self.fields.speed)
 
+    def go_one_by_one(self) -> None:
+        """Ask laws for one particle at once: eight at once may be of runs with steps of their own."""
+        self._simd = False
+
     def moduli(self) -> list[tuple[float, float]]:
         """Moduli of pressure and of shear waves at F = I [Pa] of each body; reads the device."""
         found = []

@@ -4,7 +4,7 @@ import functools
 
 import warp as wp
 
-from ..atomics import lower_to, raise_to
+from ..atomics import lower_at, raise_at
 from ..fields import clock_structure, structure
 from ..linalg import det, inverse, largest_shortening
 from ..materials import Law
@@ -77,7 +77,7 @@ def make_flux(space: Space, law: Law, several: bool, fixed: bool, dual: bool) ->
         if wp.static(remembers):
             rate = rate_of(a, F[a], grad_v[a], reference)
             h = history[a - begin]
-            ahead = real(fraction * clock.dt[0])
+            ahead = real(fraction * clock.dt[clock.run[a]])
         keep(a, P_of(F[a], rate, h, ahead, c), reference, flux)
 
     return compute_flux
@@ -115,7 +115,7 @@ def keep_speeds(space: Space, law: Law, fixed: bool) -> wp.Function:
         largest_shortening(space),
     )
     drag_of, viscous, rate_of = law.viscosity, law.viscosity is not None, velocity_gradient(space, fixed)
-    raise_rate, resolution_of, with_viscosity = raise_to(real), resolution(space), rate_with_viscosity(real)
+    raise_rate, resolution_of, with_viscosity = raise_at(real), resolution(space), rate_with_viscosity(real)
 
     @wp.func
     def keep_speeds(
@@ -155,7 +155,7 @@ def keep_speeds(space: Space, law: Law, fixed: bool) -> wp.Function:
         if wp.ddot(grad_v, grad_v) * shortening * real(dim) > strain_rate * strain_rate:
             D = grad_v @ invert(G)
             rate = wp.max(rate, wp.sqrt(wp.ddot(D, D)) / real(STRAIN))
-        raise_rate(clock.rate, rate)
+        raise_rate(clock.rate, clock.run[a], rate)
 
     return keep_speeds
 
@@ -267,7 +267,7 @@ def keep_update(space: Space, law: Law, tied: bool) -> wp.Function:
         for i in range(wp.static(length)):
             nothing += h[i] * real(0.0)
         if nothing != real(0.0):
-            lower_to(clock.bad, a)
+            lower_at(clock.bad, clock.run[a], clock.first + a)
 
     return keep_update
 
@@ -298,7 +298,7 @@ def make_update(space: Space, law: Law, several: bool, fixed: bool, tied: bool) 
         flux.dissipated[a] = real(0.0)
         if wp.static(tied):
             flux.slipped[a] = real(0.0)
-        dt = real(clock.dt[0])
+        dt = real(clock.dt[clock.run[a]])
         if dt > real(0.0):
             rate = rate_of(a, F[a], grad_v[a], reference)
             F_a, h, lost = updated(F[a], rate, history[a - begin], dt, c)

@@ -1,11 +1,11 @@
-"""Is the state still physical? One flag on the device, set by the bad particle that is first in memory."""
+"""Is the state still physical? A flag for each run on the device, set by the bad particle that is first in memory."""
 
 import functools
 from typing import Any
 
 import warp as wp
 
-from ..atomics import lower_to
+from ..atomics import lower_at
 from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import det
@@ -50,11 +50,11 @@ def _make_check(space: Space) -> wp.Kernel:
             for j in range(wp.static(space.dim)):
                 nothing += state.F[a][i, j] * real(0.0)
         if nothing != real(0.0) or determinant(state.F[a]) <= real(0.0):
-            lower_to(clock.bad, a)
+            lower_at(clock.bad, clock.run[a], a)
 
     return check
 
 
 def check(launch: Launcher, space: Space, state: StateArrays, clock: ClockArrays) -> None:
-    """Set ``clock.bad`` to the lowest index of a particle with det F ≤ 0 or a non-finite x, v or F."""
+    """Set ``clock.bad`` of each run to the lowest index of a particle with det F ≤ 0 or a non-finite x, v or F."""
     launch(_make_check(space), len(state.x), [state, clock])

@@ -4,7 +4,7 @@ import functools
 
 import warp as wp
 
-from ..atomics import lower_to
+from ..atomics import lower_at
 from ..execution import Launcher
 from ..fields import clock_structure, neighbour_structure, structure
 from ..materials import Law
@@ -50,7 +50,7 @@ def _make_heat(space: Space, sensed: bool) -> wp.Kernel:
             b = near.index[k]
             force = pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
             lost += wp.dot(force, v_old[b] + v_new[b] - mean_a)
-        out[a] = lost * real(0.25) * real(clock.dt[0])
+        out[a] = lost * real(0.25) * real(clock.dt[clock.run[a]])
 
     return heat
 
@@ -79,7 +79,7 @@ def _make_take(space: Space, law: Law) -> wp.Kernel:
         clock: Clock,
     ):
         a = first + wp.tid()
-        if clock.dt[0] > wp.float64(0.0):
+        if clock.dt[clock.run[a]] > wp.float64(0.0):
             h = warmed(F[a], history[a - begin], heat[a] / particles.V0[a], c)
             history[a - begin] = h
             flux.dissipated[a] -= heat[a]
@@ -90,7 +90,7 @@ def _make_take(space: Space, law: Law) -> wp.Kernel:
                 if h[i] < least[i]:
                     below = int(1)
             if nothing != real(0.0) or below > 0:
-                lower_to(clock.bad, a)
+                lower_at(clock.bad, clock.run[a], clock.first + a)
 
     return take
 

@@ -61,7 +61,7 @@ def _make_adopt(space: Space) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def adopt(first: int, clock: Clock, state: State, other: State, dv: wp.array(dtype=vec)):
         a = first + wp.tid()
-        if clock.dt[0] == wp.float64(0.0):
+        if clock.dt[clock.run[a]] == wp.float64(0.0):
             other.v[a] = state.v[a]
             dv[a] = vec()
             return

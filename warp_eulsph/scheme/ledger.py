@@ -9,12 +9,12 @@ import warp as wp
 
 from ..execution import Launcher
 from ..fields import clock_structure, part_of, structure
-from ..reduce import Sum, SumOfParticles
+from ..reduce import SumOfParticles, sum_of
 from ..space import Space, matrix_type, vector_type
 from ..structs import ParticleArrays, StateArrays
 from .exchanges import Exchanges
 from .medium import Medium
-from .powers import loads_power, lost, note, powers, slipped, work
+from .powers import loads_power, lost, make_kinetic, make_own, make_subtract, note, powers, slipped, work
 from .time_step import DeviceClock
 
 #: Energy that each mechanism added since the start [J]; negative values were dissipated.
@@ -30,6 +30,8 @@ ACCOUNTS = (
     "stepping",
     "shifting",
 )
+#: Those by which energy comes in.
+PUT_IN = ("external", "constraint", "limiter")
 _Entry = wp.types.vector(length=len(ACCOUNTS), dtype=wp.float64)
 
 
@@ -70,8 +72,7 @@ def _make_entries(
     @wp.kernel(module="unique", enable_backward=False)
     def entries(
         first: int,
-        n: int,
-        each: int,
+        bounds: wp.array(dtype=wp.int32),
         particles: Particles,
         reference: Reference,
         state: State,
@@ -88,8 +89,8 @@ def _make_entries(
         out: wp.array(dtype=_Entry),
     ):
         block = first + wp.tid()
-        dt, total = clock.dt[0], _Entry()
-        for a in range(block * each, wp.min((block + 1) * each, n)):
+        dt, total = clock.dt[clock.run[bounds[block]]], _Entry()
+        for a in range(bounds[block], bounds[block + 1]):
             mass, v = wide(particles.mass[a]), precise(state.v[a])
             v_mean = wide(0.5) * (precise(v_old[a]) + v)
             impulse = (v - precise(forces.free_v[a])) * mass
@@ -136,8 +137,7 @@ def _make_shift_entry(space: Space) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def shift_entry(
         first: int,
-        n: int,
-        each: int,
+        bounds: wp.array(dtype=wp.int32),
         particles: Particles,
         state: State,
         v_old: wp.array(dtype=vec),
@@ -147,7 +147,7 @@ def _make_shift_entry(space: Space) -> wp.Kernel:
     ):
         block = first + wp.tid()
         total = wide(0.0)
-        for a in range(block * each, wp.min((block + 1) * each, n)):
+        for a in range(bounds[block], bounds[block + 1]):
             v, before = precise(state.v[a]), precise(v_old[a])
             gain = wide(0.5) * wide(particles.mass[a]) * wp.dot(v - before, v + before) + W[a] - W_old[a]
             total += wide(particles.share[a]) * gain
@@ -160,63 +160,41 @@ def _make_shift_entry(space: Space) -> wp.Kernel:
 
 
 @functools.cache
-def _make_subtract() -> wp.Kernel:
-    @wp.kernel(module="unique", enable_backward=False)
-    def subtract(first: int, value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
-        a = first + wp.tid()
-        out[a] = value[a] - out[a]
-
-    return subtract
-
-
-@functools.cache
-def _make_kinetic(space: Space) -> wp.Kernel:
-    Particles, vec = structure(space, "Particles"), space.vec
-    precise = wp.types.vector(length=space.dim, dtype=wp.float64)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def kinetic(first: int, particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
-        a = first + wp.tid()
-        v_a = precise(v[a])
-        out[a] = wp.float64(0.5) * wp.float64(particles.share[a] * particles.mass[a]) * wp.dot(v_a, v_a)
-
-    return kinetic
-
-
-@functools.cache
-def _make_own(space: Space) -> wp.Kernel:
-    """Kernel: leave out what ghosts hold."""
-    Particles = structure(space, "Particles")
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def own(first: int, particles: Particles, value: wp.array(dtype=wp.float64)):
-        a = first + wp.tid()
-        value[a] = value[a] * wp.float64(particles.share[a])
-
-    return own
-
-
-@functools.cache
 def _make_book() -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
-    def book(step: wp.array(dtype=_Entry), total: wp.array(dtype=_Entry)):
-        total[0] = total[0] + step[0]
+    def book(first: int, step: wp.array(dtype=_Entry), total: wp.array(dtype=_Entry)):
+        r = first + wp.tid()
+        total[r] = total[r] + step[r]
 
     return book
 
 
 class _Page:
-    """The books of one medium: what its particles have in the arrays of all."""
+    """The books of one medium: what its particles have in the arrays of all, and the entries of its runs."""
 
-    def __init__(self, medium: Medium, v_old: wp.array, W_old: wp.array, W: wp.array, dW_limited: wp.array):
+    def __init__(
+        self,
+        medium: Medium,
+        clock: DeviceClock,
+        v_old: wp.array,
+        W_old: wp.array,
+        W: wp.array,
+        dW_limited: wp.array,
+        total: wp.array,
+    ):
         self.medium, span = medium, medium.span
         self.v_old, self.W_old, self.W = (part_of(array, span) for array in (v_old, W_old, W))
         self.dW_limited = part_of(dW_limited, span)
-        self.sum_entries = SumOfParticles(_Entry, medium.n, v_old.device)
+        runs = clock.runs_of(span)
+        self.sum_entries = SumOfParticles(_Entry, [len(part) for part in runs.values()], v_old.device)
+        self.total = total[min(runs) : max(runs) + 1]
+        self.step = wp.zeros(len(runs), dtype=_Entry, device=v_old.device)
 
 
 class Ledger:
-    """Energy accounts on the device, booked every step in float64 and read when asked.
+    """Energy accounts of each run on the device, booked every step in float64 and read when asked.
+
+    What is told of all runs together leaves out those that have failed.
 
     What interactions do has an account where there are any: their work on the bodies and what they hold themselves.
 
@@ -241,10 +219,13 @@ class Ledger:
         self.v_old = wp.zeros(n, dtype=space.vec, device=device)
         self._W_old, self._W = (wp.zeros(n, dtype=wp.float64, device=device) for _ in range(2))
         self._dW_limited = wp.zeros(n if limited else 0, dtype=wp.float64, device=device)
-        self._pages = [_Page(medium, self.v_old, self._W_old, self._W, self._dW_limited) for medium in media]
-        self._step, self._total = (wp.zeros(1, dtype=_Entry, device=device) for _ in range(2))
-        self._energy, self._sum = wp.zeros(1, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
-        self.start, self._most = 0.0, 0.0
+        runs, arrays = len(clock.sizes), (self.v_old, self._W_old, self._W, self._dW_limited)
+        self._total = wp.zeros(runs, dtype=_Entry, device=device)
+        self._pages = [_Page(medium, clock, *arrays, self._total) for medium in media]
+        self._energy = wp.zeros(runs, dtype=wp.float64, device=device)
+        self._sum = sum_of(wp.float64, clock.sizes, device)
+        self._starts = wp.zeros(runs, dtype=wp.float64, device=device)
+        self._start, self._most = 0.0, np.zeros(runs)
         self._exchanges, self._damped = exchanges, damped
 
     def open(self, U: StateArrays) -> None:
@@ -255,11 +236,15 @@ class Ledger:
         self._total.zero_()
         if self._exchanges is not None:
             self._exchanges.open()
-        self.start = self.kinetic(U) + self.stored(U) + self.held()
+        starts = self.kinetic_of_runs(U) + self.stored_of_runs(U) + self.held()
+        self._starts.assign(starts)
+        self._start = float(starts[0])
 
     def evolving(self) -> dict[str, wp.array]:
         """The accounts and the end of the last step booked, by name; with ``start`` what a checkpoint must hold."""
         held = {"Ledger.total": self._total, "Ledger.v_old": self.v_old, "Ledger.W_old": self._W_old}
+        if self.clock.independent:
+            held["Ledger.start"] = self._starts
         return held if self._exchanges is None else held | self._exchanges.evolving()
 
     def open_limiter(self, U: StateArrays) -> None:
@@ -271,7 +256,7 @@ class Ledger:
         """Note what limiters did to the stored energies."""
         for page in self._limited():
             page.medium.flux.energy(page.medium.of(U).F, page.W)
-            self._launch(_make_subtract(), len(page.W), [page.W, page.dW_limited])
+            self._launch(make_subtract(), len(page.W), [page.W, page.dW_limited])
 
     def _limited(self) -> list[_Page]:
         return [page for page in self._pages if page.medium.limiter is not None]
@@ -292,7 +277,7 @@ class Ledger:
             if smoothed is not None:
                 dv = smoothed[k]
             arguments += [flux.fields, medium.grad_v, page.v_old, page.W_old, page.W, dv, page.dW_limited]
-            arguments += [self.clock.fields, medium.forces]
+            arguments += [medium.clock, medium.forces]
             tied, dragged = len(flux.fields.tie) > 0, len(flux.fields.drag) > 0
             limits, smooths, inelastic = limiter is not None, smoothed is not None, len(flux.fields.dissipated) > 0
             yielding = len(flux.fields.slipped) > 0
@@ -308,14 +293,27 @@ class Ledger:
             self._book(page, _make_shift_entry(self.space), arguments)
 
     def _book(self, page: _Page, kernel: wp.Kernel, arguments: list[Any]) -> None:
-        page.sum_entries(kernel, arguments, self._step)
-        self._launch.once(_make_book(), 1, [self._step, self._total])
+        page.sum_entries(kernel, arguments, page.step)
+        self._launch(_make_book(), len(page.step), [page.step, page.total])
+
+    @property
+    def start(self) -> float:
+        """Energy at the start [J]; may be set where there is one clock."""
+        return float(self.clock.total(self._starts.numpy())) if self.clock.independent else self._start
+
+    @start.setter
+    def start(self, energy: float) -> None:
+        self._start = energy
 
     def kinetic(self, U: StateArrays) -> float:
         """Kinetic energy [J]; reads the device."""
-        self._launch(_make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W])
+        return float(self.clock.total(self.kinetic_of_runs(U)))
+
+    def kinetic_of_runs(self, U: StateArrays) -> np.ndarray:
+        """Kinetic energy [J] of each run, (runs,); reads the device."""
+        self._launch(make_kinetic(self.space), len(self._W), [self.particles, U.v, self._W])
         self._sum(self._W, self._energy)
-        return float(self._energy.numpy()[0])
+        return self._energy.numpy().copy()
 
     def stored_by_particle(self, U: StateArrays) -> np.ndarray:
         """Stored energy [J] of each particle, by place, (n,); reads the device."""
@@ -328,10 +326,14 @@ class Ledger:
 
     def stored(self, U: StateArrays) -> float:
         """Stored energy [J]; reads the device."""
+        return float(self.clock.total(self.stored_of_runs(U)))
+
+    def stored_of_runs(self, U: StateArrays) -> np.ndarray:
+        """Stored energy [J] of each run, (runs,); reads the device."""
         self._store(U)
-        self._launch(_make_own(self.space), len(self._W), [self.particles, self._W])
+        self._launch(make_own(self.space), len(self._W), [self.particles, self._W])
         self._sum(self._W, self._energy)
-        return float(self._energy.numpy()[0])
+        return self._energy.numpy().copy()
 
     def held(self) -> float:
         """Energy that interactions hold [J]; reads the device."""
@@ -343,18 +345,34 @@ class Ledger:
 
     def accounts(self) -> dict[str, float]:
         """Energy that each mechanism added since the start [J], interactions where there are any; reads the device."""
-        found = dict(zip(ACCOUNTS, np.asarray(self._total.numpy()[0]).tolist(), strict=True))
+        found = dict(zip(ACCOUNTS, self.clock.total(self._total.numpy()).tolist(), strict=True))
         if self._exchanges is not None:
             found["external"] += self._exchanges.supplied()
             found["interaction"] = sum(self.exchanged())
         return found
 
+    def accounts_of_runs(self) -> dict[str, np.ndarray]:
+        """What each mechanism but interactions added to each run since the start [J], (runs,); reads the device."""
+        return dict(zip(ACCOUNTS, self._total.numpy().T.copy(), strict=True))
+
+    def start_of_runs(self) -> np.ndarray:
+        """Energy of each run at the start [J], (runs,); reads the device."""
+        return self._starts.numpy().copy() if self.clock.independent else np.array([self._start])
+
     def made(self) -> float:
-        """Energy that the steps themselves made, over the most that was put in at any look; reads the device."""
+        """Energy that steps by the only clock made, over the most that was put in at any look; reads the device."""
         accounts = self.accounts()
-        put_in = abs(self.start) + sum(max(accounts[name], 0.0) for name in ("external", "constraint", "limiter"))
-        self._most = max(self._most, put_in)
-        return max(accounts["stepping"], 0.0) / self._most if self._most > 0.0 else 0.0
+        put_in = abs(self._start) + sum(max(accounts[name], 0.0) for name in PUT_IN)
+        most = self._most[0] = max(self._most[0], put_in)
+        return max(accounts["stepping"], 0.0) / most if most > 0.0 else 0.0
+
+    def made_by_runs(self) -> np.ndarray:
+        """Energy that the steps of each run made, over the most that was put in, (runs,); reads the device."""
+        accounts = self.accounts_of_runs()
+        put_in = np.abs(self.start_of_runs()) + sum(np.maximum(accounts[name], 0.0) for name in PUT_IN)
+        self._most = np.fmax(self._most, put_in)
+        made = np.maximum(accounts["stepping"], 0.0)
+        return np.divide(made, self._most, out=np.zeros_like(made), where=self._most > 0.0)
 
     def residual(self, U: StateArrays) -> float:
         """Energy that no account explains [J]; round-off if the operators are duals of each other."""

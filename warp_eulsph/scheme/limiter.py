@@ -151,7 +151,7 @@ def _make_add(space: Space) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def add(first: int, clock: Clock, dv: wp.array(dtype=vec), dF: wp.array(dtype=mat), state: State):
         a = first + wp.tid()
-        if clock.dt[0] == wp.float64(0.0):
+        if clock.dt[clock.run[a]] == wp.float64(0.0):
             dv[a] = vec()
             dF[a] = mat()
         state.v[a] = state.v[a] + dv[a]

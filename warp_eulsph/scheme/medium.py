@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
 import warp as wp
 
 from ..boundaries import Bound
@@ -24,10 +23,11 @@ from .policy import ReferencePolicy
 from .reference import Configuration
 from .sensor import SensorField
 from .sharpening import Sharpener
-from .shifting import Shifter
+from .shifting import Shifter, held_at_start
 from .stabiliser import Stabiliser, Sums
 from .updates import make_drift, make_kick, make_mean, make_predict
 from .volume_flux import VolumeFlux
+from .waiting import Waiting
 from .walls import Walls
 
 
@@ -61,19 +61,6 @@ def is_corrected(options: Scheme, policy: ReferencePolicy, surface_given: bool) 
     return options.correction is not None and (surface_given or not policy.fixed)
 
 
-def _check_bonds(groups: Sequence[int], per_body: bool, who: str) -> None:
-    """Raise ValueError where bodies are bonded and something closes its sums body by body."""
-    if per_body and len(set(groups)) < len(groups):
-        raise ValueError(f"{who} takes each body by itself and is not for bonded ones; use Balance()")
-
-
-def _held(conditions: Sequence[Bound], span: range) -> np.ndarray:
-    """Which particles of ``span``, counted from its start, have imposed velocities at the start of a run, (k,)."""
-    imposed = [condition.indices for condition in conditions if type(condition).impose is not Bound.impose]
-    numbers = np.concatenate([np.zeros(0, dtype=np.int32), *imposed])
-    return numbers[(numbers >= span.start) & (numbers < span.stop)] - span.start
-
-
 class Medium:
     """A medium at work. States are those of the whole world, of which it sees its own particles.
 
@@ -94,7 +81,7 @@ class Medium:
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
-            held = _held(conditions, self.span)
+            held = held_at_start(conditions, self.span)
             self.shifter = options.shifting.build(space, self.particles, self.flux, held, device)
         smoothing = options.smoothing
         rows = n if smoothing is not None and smoothing.needs_gradient else 0
@@ -114,7 +101,7 @@ class Medium:
         if plain:
             self.stabiliser = DualForces(space, n, self.sharpener, device, within)
         if options.correction is not None and is_corrected(options, self.policy, parts.surface_given):
-            _check_bonds(parts.groups, options.correction.per_body, f"correction={options.correction}")
+            options.correction.check_bonds(parts.groups)
             self.stabiliser = options.correction.build(space, self.particles, self.flux, device)
         if self.stabiliser.takes_dual(self.configuration, sensed):
             self.flux.keep_dual()
@@ -142,11 +129,14 @@ class Medium:
         clock: ClockArrays,
         moves_surfaces: bool,
     ) -> None:
-        """See the own particles of the world's two states, of ``forces`` and of ∇v, by its ``clock``."""
+        """See the own particles of the world's two states, of ``forces`` and of ∇v, by their ``clock``."""
         self._whole, self._own = U, part(self.space, U, "State", self.span)
         self._own_half = part(self.space, half, "State", self.span)
         self.forces, self.grad_v = part(self.space, forces, "Forces", self.span), part_of(grad_v, self.span)
         self.clock, self.moves_surfaces = clock, moves_surfaces
+        self.waiting = Waiting(self.space, [], clock, self.device)
+        if clock.every > 0:
+            self.flux.go_one_by_one()
         upwind, flux = self.options.dissipation, self.flux.fields
         epsilon = 0.0 if upwind is None else upwind.epsilon
         d = None if upwind is None or upwind.sensor is None else self.sensors[upwind.sensor].d
@@ -155,6 +145,14 @@ class Medium:
     def keep_gradients(self, on: bool) -> None:
         """Whether each step leaves ∇_k v^{n+1} for the next one, where F^{n+½} was, which is done with by then."""
         self.steady, self.kept = on, self._own_half.F if on else self.grad_v
+
+    def wait(self, state: StateArrays) -> None:
+        """Have its refreshes, from now on, leave out the runs that wait."""
+        if not self.policy.fixed:
+            arrays = [array for name, array in self.evolving().items() if not name.startswith("Flux.history")]
+            arrays += [self.of(state).F, self.of(state).surface]
+            histories = [(kind.first, kind.history) for kind in self.flux.kinds]
+            self.waiting = Waiting(self.space, [*histories, *[(0, array) for array in arrays]], self.clock, self.device)
 
     @property
     def heats(self) -> bool:
@@ -212,8 +210,9 @@ class Medium:
 
     def move(self, state: StateArrays) -> None:
         """Make ``state`` the reference, with what materials start anew from it; neighbours are counted."""
+        self.waiting.keep()
         self.flux.rebase(self.of(state).F)
-        self.configuration.move(self.of(state))
+        self.configuration.move(self.of(state), self.waiting.put_back)
 
     def renew(self, state: StateArrays) -> None:
         """Neighbours and corrections of the new reference (M3), what the options add, ∇_k v where it is kept."""
@@ -225,6 +224,7 @@ class Medium:
             self.walls.add_gradient(self.of(state).v, self.kept)
         else:
             self.keep_gradient(state)
+        self.waiting.put_back()
 
     def stabilise(self, state: StateArrays) -> None:
         """Prepare the stabiliser for a new reference, and what else depends on it."""

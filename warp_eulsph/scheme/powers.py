@@ -1,4 +1,4 @@
-"""What the ledger asks of a particle in a step: work and power in float64, as ``wp.func``."""
+"""What the ledger asks of a particle: work and power in a step in float64, as ``wp.func``, and energies, by kernels."""
 
 import functools
 
@@ -92,3 +92,40 @@ def work(space: Space) -> wp.Function:
         return wp.dot(precise(force), v)
 
     return work
+
+
+@functools.cache
+def make_subtract() -> wp.Kernel:
+    @wp.kernel(module="unique", enable_backward=False)
+    def subtract(first: int, value: wp.array(dtype=wp.float64), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
+        out[a] = value[a] - out[a]
+
+    return subtract
+
+
+@functools.cache
+def make_kinetic(space: Space) -> wp.Kernel:
+    Particles, vec = structure(space, "Particles"), space.vec
+    precise = wp.types.vector(length=space.dim, dtype=wp.float64)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def kinetic(first: int, particles: Particles, v: wp.array(dtype=vec), out: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
+        v_a = precise(v[a])
+        out[a] = wp.float64(0.5) * wp.float64(particles.share[a] * particles.mass[a]) * wp.dot(v_a, v_a)
+
+    return kinetic
+
+
+@functools.cache
+def make_own(space: Space) -> wp.Kernel:
+    """Kernel: leave out what ghosts hold."""
+    Particles = structure(space, "Particles")
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def own(first: int, particles: Particles, value: wp.array(dtype=wp.float64)):
+        a = first + wp.tid()
+        value[a] = value[a] * wp.float64(particles.share[a])
+
+    return own

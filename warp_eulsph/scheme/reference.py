@@ -1,7 +1,7 @@
 """The reference configuration k: positions, volumes, corrections and neighbour lists in which weights live."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import warp as wp
@@ -208,9 +208,13 @@ class Configuration:
         """Make ``state`` the reference: x_k, F_k, V_k, h_k, neighbours, pair weights, corrections (M3)."""
         BY_HOST(lambda: self.move(state), [self.lists], self.renew)
 
-    def move(self, state: StateArrays) -> None:
-        """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has."""
+    def move(self, state: StateArrays, mend: Callable[[], None] = lambda: None) -> None:
+        """First part of a refresh, launches only: x_k, F_k, V_k, h_k, and how many neighbours each particle has.
+
+        ``mend`` is called in between, to change what is not to be refreshed.
+        """
         self._launch(_make_adopt(self.space, self.fixed), len(self.K), [state, self.particles, self.fields])
+        mend()
         self.lists.count_neighbours(self.fields.x)
 
     def renew(self, v: wp.array | None = None, sums: wp.array | None = None) -> None:

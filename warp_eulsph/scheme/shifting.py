@@ -2,11 +2,13 @@
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
+from ..boundaries import Bound
 from ..execution import Launcher
 from ..fields import clock_structure, structure
 from ..linalg import inverse
@@ -14,10 +16,10 @@ from ..space import Space
 from ..structs import ClockArrays, ParticleArrays, StateArrays
 from .exposure import Exposure
 from .flux import Flux
-from .health import WELL
 from .laws import Part
 from .projection import Projection, pad
 from .reference import Configuration
+from .time_step import takes_step
 
 # Least value of what has none: a constant of a kernel must be finite, in float32 too.
 NO_BOUND = -1e38
@@ -83,7 +85,7 @@ def _make_shift(space: Space, even: bool) -> wp.Kernel:
         structure(space, "Reference"),
         structure(space, "State"),
     )
-    Clock = clock_structure(space)
+    Clock, moves = clock_structure(space), takes_step(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def shift(
@@ -109,8 +111,7 @@ def _make_shift(space: Space, even: bool) -> wp.Kernel:
         most = bound * particles.spacing[a] * reference.h[a] / particles.h[a]
         if length > most:
             delta = delta * (most / length)
-        running = clock.bad[0] == WELL and clock.t[0] < clock.target[0]
-        if not running or free[a] == 0 or beside[a] != 0:
+        if not moves(clock, clock.run[a]) or free[a] == 0 or beside[a] != 0:
             delta = vec()
         out[a] = delta
         mass = particles.mass[a]
@@ -183,6 +184,13 @@ class Remap:
         wp.copy(self._rows, self.part.history, dest_offset=first)
         configuration.gradient(self._rows, self._gradient)
         self._launch(self._kernel, size, [first, moved, self._gradient, self.part.history], first)
+
+
+def held_at_start(conditions: Sequence[Bound], span: range) -> np.ndarray:
+    """Which particles of ``span``, counted from its start, have imposed velocities at the start of a run, (k,)."""
+    imposed = [condition.indices for condition in conditions if type(condition).impose is not Bound.impose]
+    numbers = np.concatenate([np.zeros(0, dtype=np.int32), *imposed])
+    return numbers[(numbers >= span.start) & (numbers < span.stop)] - span.start
 
 
 class Shifter:

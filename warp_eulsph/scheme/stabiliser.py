@@ -1,6 +1,7 @@
 """What keeps the sums of a reference stable: dissipation, and the correction of what the arrangement gets wrong."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -20,6 +21,11 @@ class Correction(ABC):
     per_body: ClassVar[bool] = False
     #: Its stabiliser has potentials ``psi``, (n,) of vec, that shifting (M15) follows.
     has_potentials: ClassVar[bool] = False
+
+    def check_bonds(self, groups: Sequence[int]) -> None:
+        """Raise ValueError where bodies are bonded, of these numbers each, and it closes sums body by body."""
+        if self.per_body and len(set(groups)) < len(groups):
+            raise ValueError(f"correction={self} takes each body by itself and is not for bonded ones; use Balance()")
 
     @abstractmethod
     def build(self, space: Space, particles: ParticleArrays, flux: Flux, device: wp.DeviceLike) -> "Stabiliser":

@@ -2,12 +2,14 @@
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from ..execution import Launcher
-from ..fields import clock_structure
+from ..fields import clock_structure, part_of, repeated
 from ..space import Space
 from ..structs import ClockArrays
 from .health import WELL
@@ -45,49 +47,94 @@ EVEN = 32.0
 
 
 @functools.cache
-def _make_choose(space: Space) -> wp.Kernel:
+def takes_step(space: Space) -> wp.Function:
+    """``wp.func`` whether run r takes part in the coming step: others are as they are after it.
+
+    Independent runs wait for each other at times to hit and to look at, and, where references are refreshed every few
+    steps, for the step at which their own is due.
+    """
     Clock = clock_structure(space)
 
+    @wp.func
+    def takes_step(clock: Clock, r: int) -> bool:
+        if clock.bad[r] != WELL or clock.t[r] >= clock.target[0]:
+            return False
+        if clock.every == 0:
+            return True
+        return clock.t[r] < clock.look[0] and clock.lag[r] % clock.every == 0
+
+    return takes_step
+
+
+@functools.cache
+def _make_choose(space: Space) -> wp.Kernel:
+    Clock, moves = clock_structure(space), takes_step(space)
+
     @wp.kernel(module="unique", enable_backward=False)
-    def choose(clock: Clock, cfl: wp.float64, growth: wp.float64, fixed: wp.float64):
+    def choose(first: int, clock: Clock, cfl: wp.float64, growth: wp.float64, fixed: wp.float64):
+        r = first + wp.tid()
+        if r == 0:
+            clock.running[0] = 0  # until ``tick`` finds a run that goes on
         dt = fixed
         if fixed == wp.float64(0.0):
-            rate = wp.float64(clock.rate[0])
-            if clock.added[0] > wp.float64(0.0):
-                rate = wp.sqrt(rate * rate + clock.added[0])
+            rate = wp.float64(clock.rate[r])
+            if clock.added[r] > wp.float64(0.0):
+                rate = wp.sqrt(rate * rate + clock.added[r])
             dt = cfl / rate
-            if clock.free_dt[0] > wp.float64(0.0):
-                dt = wp.min(dt, growth * clock.free_dt[0])
-        if clock.bad[0] != WELL:
+            if clock.free_dt[r] > wp.float64(0.0):
+                dt = wp.min(dt, growth * clock.free_dt[r])
+        clock.added[r] = wp.float64(0.0)  # asked for anew before the next step
+        if clock.every > 0 and not moves(clock, r):
+            clock.dt[r] = wp.float64(0.0)
+            return
+        if clock.bad[r] != WELL:
             dt = wp.float64(0.0)  # the run has failed: time stands still until the host looks
-        clock.free_dt[0] = dt
-        clock.longest_dt[0] = wp.max(clock.longest_dt[0], dt)
-        left = clock.target[0] - clock.t[0]
+        clock.free_dt[r] = dt
+        clock.longest_dt[r] = wp.max(clock.longest_dt[r], dt)
+        left = clock.target[0] - clock.t[r]
         if dt >= left * (wp.float64(1.0) - wp.float64(1.0e-10)):
             dt = wp.max(left, wp.float64(0.0))
         elif dt * wp.float64(EVEN) > left and fixed == wp.float64(0.0):
             # Even steps to the target instead of long ones and a short one, which again and again swing modes up
             dt = left / wp.ceil(left / dt * (wp.float64(1.0) - wp.float64(1.0e-10)))
-        clock.dt[0] = dt
-        clock.added[0] = wp.float64(0.0)  # asked for anew before the next step
+        clock.dt[r] = dt
 
     return choose
 
 
 @functools.cache
-def _make_tick(space: Space) -> wp.Kernel:
+def unfinished(space: Space) -> wp.Function:
+    """``wp.func`` whether run r is well and has not reached what it aims at."""
     Clock = clock_structure(space)
 
+    @wp.func
+    def unfinished(clock: Clock, r: int) -> bool:
+        return clock.bad[r] == WELL and clock.t[r] < wp.min(clock.target[0], clock.look[0])
+
+    return unfinished
+
+
+@functools.cache
+def _make_tick(space: Space) -> wp.Kernel:
+    """Kernel: the clock of each run; the batch is at its end where nobody says otherwise."""
+    Clock, goes_on = clock_structure(space), unfinished(space)
+
     @wp.kernel(module="unique", enable_backward=False)
-    def tick(clock: Clock):
-        if clock.bad[0] == WELL:
-            if clock.dt[0] >= clock.target[0] - clock.t[0]:
-                clock.t[0] = wp.max(clock.target[0], clock.t[0])
+    def tick(first: int, clock: Clock):
+        r = first + wp.tid()
+        if clock.bad[r] == WELL:
+            if clock.dt[r] >= clock.target[0] - clock.t[r]:
+                clock.t[r] = wp.max(clock.target[0], clock.t[r])
             else:
-                clock.t[0] = clock.t[0] + clock.dt[0]
-        clock.taken[0] = clock.taken[0] + 1
-        if clock.bad[0] != WELL or clock.t[0] >= wp.min(clock.target[0], clock.look[0]):
-            clock.running[0] = 0
+                clock.t[r] = clock.t[r] + clock.dt[r]
+        if clock.dt[r] > wp.float64(0.0):
+            clock.steps[r] = clock.steps[r] + 1
+        else:
+            clock.lag[r] = clock.lag[r] + 1
+        if r == 0:
+            clock.taken[0] = clock.taken[0] + 1
+        if goes_on(clock, r):
+            clock.running[0] = 1
 
     return tick
 
@@ -97,10 +144,11 @@ def _make_add(space: Space) -> wp.Kernel:
     Clock, real = clock_structure(space), space.real
 
     @wp.kernel(module="unique", enable_backward=False)
-    def add(clock: Clock):
-        half = wp.float64(0.5) * wp.float64(clock.frequency[0])
-        clock.added[0] = clock.added[0] + half * half
-        clock.frequency[0] = real(0.0)
+    def add(first: int, clock: Clock):
+        r = first + wp.tid()
+        half = wp.float64(0.5) * wp.float64(clock.frequency[r])
+        clock.added[r] = clock.added[r] + half * half
+        clock.frequency[r] = real(0.0)
 
     return add
 
@@ -112,7 +160,10 @@ def _make_open(space: Space) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def open_batch(clock: Clock):
         clock.taken[0] = 0
-        clock.running[0] = int(clock.bad[0] == WELL and clock.t[0] < clock.target[0])
+        clock.running[0] = 0
+        for r in range(clock.t.shape[0]):
+            if clock.bad[r] == WELL and clock.t[r] < clock.target[0]:
+                clock.running[0] = 1
 
     return open_batch
 
@@ -120,44 +171,104 @@ def _make_open(space: Space) -> wp.Kernel:
 class DeviceClock:
     """The clock arrays and the launches that move them; a step at the target time has Δt = 0 and changes nothing.
 
-    ``cfl`` is the scheme's own Courant number, for options that leave it open.
+    Args:
+        cfl: the scheme's own Courant number, for options that leave it open.
+        sizes: particles of each run that has a clock of its own, in their order; one of all where they share it.
+        every: steps between refreshes of independent runs; 0 where there is one clock.
+
+    Attributes:
+        fields: struct ``Clock``. independent: whether each run has its own time and steps.
     """
 
-    def __init__(self, space: Space, option: TimeStep, cfl: float, device: wp.DeviceLike):
-        self.space, self.option, self.device = space, option, device
+    def __init__(
+        self,
+        space: Space,
+        option: TimeStep,
+        cfl: float,
+        device: wp.DeviceLike,
+        sizes: Sequence[int],
+        every: int = 0,
+    ):
+        self.space, self.option, self.device, self.sizes = space, option, device, tuple(sizes)
+        self.independent = every > 0
         self._launch = Launcher(device)
         self.cfl = cfl if option.cfl is None else option.cfl
         self.fields: ClockArrays = clock_structure(space)()
-        for name in ("t", "dt", "free_dt", "longest_dt", "target", "look", "added"):
-            setattr(self.fields, name, wp.zeros(1, dtype=wp.float64, device=device))
+        runs = len(sizes)
+        for name in ("t", "dt", "free_dt", "longest_dt", "added"):
+            setattr(self.fields, name, wp.zeros(runs, dtype=wp.float64, device=device))
+        self.fields.target, self.fields.look = (wp.zeros(1, dtype=wp.float64, device=device) for _ in range(2))
         self.fields.look.fill_(math.inf)
-        self.fields.rate, self.fields.frequency = (wp.zeros(1, dtype=space.real, device=device) for _ in range(2))
-        self.fields.bad = wp.full(1, WELL, dtype=wp.int32, device=device)
+        self.fields.rate, self.fields.frequency = (wp.zeros(runs, dtype=space.real, device=device) for _ in range(2))
+        self.fields.bad = wp.full(runs, WELL, dtype=wp.int32, device=device)
         self.fields.running, self.fields.taken = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
+        self.fields.steps, self.fields.lag = (wp.zeros(runs, dtype=wp.int32, device=device) for _ in range(2))
+        self.fields.first, self.fields.every = 0, every
+        self._run = wp.array(np.repeat(np.arange(runs), sizes if every else 1), dtype=wp.int32, device=device)
+        self.fields.run = self._run if every else repeated(self._run, sum(sizes))
+
+    def runs_of(self, span: range) -> dict[int, range]:
+        """Number of each run that has particles in ``span`` -> their numbers; a run of its own is not cut."""
+        if not self.independent:
+            return {0: span}
+        ends = np.cumsum([0, *self.sizes]).tolist()
+        return {r: range(ends[r], ends[r + 1]) for r in range(len(self.sizes)) if ends[r] in span}
+
+    def of(self, span: range) -> ClockArrays:
+        """Struct ``Clock`` for kernels that count the particles of ``span`` from 0; itself where these are all."""
+        if len(span) == len(self.fields.run):
+            return self.fields
+        own: ClockArrays = clock_structure(self.space)()
+        for name in ClockArrays.__annotations__:
+            setattr(own, name, getattr(self.fields, name))
+        own.run, own.first = part_of(self.fields.run, span), span.start
+        return own
 
     def evolving(self) -> dict[str, wp.array]:
         """The clock's arrays by name: what a checkpoint must hold."""
-        return {f"Clock.{name}": getattr(self.fields, name) for name in ("t", "dt", "free_dt", "target", "rate", "bad")}
+        names = ["t", "dt", "free_dt", "target", "rate", "bad"]
+        if self.independent:
+            names += ["longest_dt", "steps", "lag"]
+        return {f"Clock.{name}": getattr(self.fields, name) for name in names}
+
+    @property
+    def well(self) -> np.ndarray:
+        """Which runs have not failed, (runs,) bool, or the only one; reads the device."""
+        well: np.ndarray = self.fields.bad.numpy() == WELL
+        return well if self.independent else np.ones(1, dtype=bool)
+
+    def total(self, values: np.ndarray) -> np.ndarray:
+        """Sum of ``values``, (runs, …), over the runs that are well; reads the device."""
+        found: np.ndarray = values[self.well].sum(axis=0) if self.independent else values[0]
+        return found
+
+    def _largest(self, values: wp.array) -> float:
+        return float(values.numpy().max() if self.independent else values.numpy()[0])
 
     @property
     def t(self) -> float:
-        """Time [s]; reads the device."""
-        return float(self.fields.t.numpy()[0])
+        """Time [s] that all runs have reached which have not failed, the last one that did if none is left; reads the
+        device."""
+        t = self.fields.t.numpy()
+        if not self.independent:
+            return float(t[0])
+        well = self.well
+        return float(t[well].min() if well.any() else t.max())
 
     @property
     def dt(self) -> float:
-        """Last time step [s]; reads the device."""
-        return float(self.fields.dt.numpy()[0])
+        """Last time step [s], the longest of independent runs; reads the device."""
+        return self._largest(self.fields.dt)
 
     @property
     def free_dt(self) -> float:
         """Last time step [s] that no output time shortened; reads the device."""
-        return float(self.fields.free_dt.numpy()[0])
+        return self._largest(self.fields.free_dt)
 
     @property
     def longest_dt(self) -> float:
         """Longest time step [s] so far that no output time shortened; reads the device."""
-        return float(self.fields.longest_dt.numpy()[0])
+        return self._largest(self.fields.longest_dt)
 
     def aim(self, target: float, look: float = math.inf) -> None:
         """Set the time [s] that must be hit next, and that from which on the host looks, which shortens no step."""
@@ -179,20 +290,20 @@ class DeviceClock:
 
     def add(self) -> None:
         """Count the ``frequency`` that one condition asked for."""
-        self._launch.once(_make_add(self.space), 1, [self.fields])
+        self._launch(_make_add(self.space), len(self.sizes), [self.fields])
 
     def choose(self) -> None:
         """Δt for the step to come, from what was asked for."""
         option = self.option
         arguments = [self.fields, self.cfl, option.growth, option.fixed or 0.0]
-        self._launch.once(_make_choose(self.space), 1, arguments)
+        self._launch(_make_choose(self.space), len(self.sizes), arguments)
 
     @property
     def bad(self) -> int | None:
-        """Place of the first unphysical particle, None while all are well; reads the device."""
+        """Place of the first unphysical particle of the only clock, None while all are well; reads the device."""
         first = int(self.fields.bad.numpy()[0])
         return None if first == WELL else first
 
     def tick(self) -> None:
         """t ← t + Δt, exactly the target when it is reached."""
-        self._launch.once(_make_tick(self.space), 1, [self.fields])
+        self._launch(_make_tick(self.space), len(self.sizes), [self.fields])

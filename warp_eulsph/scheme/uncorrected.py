@@ -119,7 +119,7 @@ def _make_turn(space: Space) -> wp.Kernel:
     ):
         a = first + wp.tid()
         Q = flux.Q[a]
-        spin = (exact[a] - wp.transpose(exact[a])) * real(wp.float64(0.5) * fraction * clock.dt[0])
+        spin = (exact[a] - wp.transpose(exact[a])) * real(wp.float64(0.5) * fraction * clock.dt[clock.run[a]])
         Q = (Q + wp.transpose(Q)) * real(0.5) + spin * (wp.trace(Q) / real(dim))
         flux.Q[a] = Q
         if dual:

@@ -51,7 +51,7 @@ def _make_exchange(space: Space) -> wp.Kernel:
             if both > real(0.0):
                 mean = (grad_p[a] + grad_p[b]) @ xi
                 flow -= near.w[k] * wp.length(xi) * (p[b][0] - p[a][0] - real(0.5) * mean[0]) / both
-        out[a] = flow * epsilon * real(clock.dt[0])
+        out[a] = flow * epsilon * real(clock.dt[clock.run[a]])
 
     return exchange
 
@@ -141,7 +141,7 @@ def _make_exchange_simd(space: Space) -> wp.Kernel:
     ):
         a = first + wp.tid()
         flow = sum_flow(a, near.start[a], near.start[a + 1], near.index, near.w, near.box, rows)
-        out[a] = flow * epsilon * real(clock.dt[0])
+        out[a] = flow * epsilon * real(clock.dt[clock.run[a]])
 
     return exchange_simd
 

@@ -23,6 +23,7 @@ from .reference import Configuration
 from .refresh import BY_HOST, Refresh
 from .stabiliser import Stabiliser
 from .time_step import DeviceClock
+from .waiting import Waiting
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,9 @@ class World:
         self.forces = self._allocate_forces()
         self.grad_v = wp.zeros(n, dtype=space.mat, device=device)
         for medium in self.media:
-            medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.fields, self.moves_surfaces)
+            medium.join(self.U, self.half, self.forces, self.grad_v, self.clock.of(medium.span), self.moves_surfaces)
             medium.keep_gradients(medium in self._steady.media)
+        self._waiting: Waiting | None = None  # nobody waits at the start
         self._start([each.surface_given for each in parts.media])
         self.ledger = Ledger(space, self.particles, self.media, self.clock, device, self._exchanges(), self.damped)
         self.ledger.open(self.U)
@@ -118,6 +120,10 @@ class World:
         self.scratch = wp.zeros(n if self.heated or self.exchanging else 0, dtype=space.real, device=device)
         for medium in self.media:
             medium.take_scratch(self.scratch, self.ledger.v_old)
+            if self.clock.independent:
+                medium.wait(self.U)
+        if self.clock.independent and self.conditions:
+            self._waiting = Waiting(space, [(0, self.U.v)], self.clock.fields, device)
 
     def _allocate_forces(self) -> ForceArrays:
         """Struct ``Forces``, where those that are always zero take the memory of one."""
@@ -267,6 +273,11 @@ class World:
     # lines of a step
 
     def _impose(self, state: StateArrays, fraction: float, steady: bool | None = None) -> None:
+        waiting = self._waiting if state is self.U else None  # what is imposed twice may differ by round-off
+        if waiting is not None:
+            waiting.keep()
         for condition in self.conditions:
             if steady in (None, condition in self._steady.conditions):
                 condition.impose(state, self.clock.fields, fraction)
+        if waiting is not None:
+            waiting.put_back()
