@@ -87,6 +87,9 @@ def options(dim, dtype):
         (es.LaxWendroff(limiter=es.FluxCorrectedTransport()), es.Current()),
     ):
         yield es.Simulation(body, scheme=scheme, dtype=dtype, **({"arrangement": arrangement} if arrangement else {}))
+    apart = [dataclasses.replace(body, x=body.x + 2.0 * k, name=f"run {k}") for k in range(2)]
+    held = [es.Fixed(lambda X: X[:, 0] % 2.0 < 0.2), es.Damping(body="run 1")]
+    yield es.Simulation(apart, boundaries=held, independent=True, arrangement=es.Current(), dtype=dtype)
 
 
 WATER = es.TaitLiquid(density=1e3, sound_speed=30.0)

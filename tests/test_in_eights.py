@@ -37,6 +37,7 @@ def make_both(space, law):
         W: wp.array(dtype=wp.float64),
         lost: wp.array(dtype=real),
         M: wp.array(dtype=pair),
+        blocks: wp.array(dtype=wp.int32),
     ):
         a = wp.tid()
         ahead[a] = stress(F[a], mat(), h[a], real(1.0), c)
@@ -57,8 +58,9 @@ def make_both(space, law):
         W: wp.array(dtype=wp.float64),
         lost: wp.array(dtype=real),
         M: wp.array(dtype=pair),
+        blocks: wp.array(dtype=wp.int32),
     ):
-        block = take(wp.tid(), 0, F, h)
+        block = take(wp.tid(), blocks, 0, F, h)
         stress_of(block, real(1.0), c, ahead)
         update_of(block, real(1.0), c, lost)
         stress_of(block, real(0.0), c, P)
@@ -87,7 +89,8 @@ def run(space, law, constants, kernel, threads, steps):
         W, lost = wp.zeros(COUNT, dtype=wp.float64), wp.zeros(COUNT, dtype=space.real)
         given = wp.array(F.astype(space.numpy), dtype=space.mat)
         M = wp.zeros(COUNT, dtype=space.row(2))
-        wp.launch(kernel, threads, [given, constants, h, ahead, P, W, lost, M])
+        blocks = wp.array([*range(0, COUNT, EIGHT), COUNT], dtype=wp.int32)
+        wp.launch(kernel, threads, [given, constants, h, ahead, P, W, lost, M, blocks])
         found.append([array.numpy().astype(float) for array in (ahead, P, W, lost, M, h)])
     return found
 

@@ -1,6 +1,7 @@
 """Bodies that are runs of their own: each as it is alone, to the last bit, and one that fails ends alone."""
 
 import dataclasses
+import json
 import logging
 import re
 
@@ -9,11 +10,14 @@ import pytest
 import warp as wp
 from bodies import RUBBER, block
 from clouds import cloud
+from kept_runs import StopAfter
 
 import warp_eulsph as es
 from warp_eulsph import execution
 from warp_eulsph.boundaries import Bound, Boundary
 from warp_eulsph.materials import J2, Failing, LinearHardening, PrincipalStrain
+from warp_eulsph.output import Recording, Run, record
+from warp_eulsph.schedule import EveryTime
 
 SIDE, RUNS = {1: 20, 2: 6, 3: 4}, 3
 FOLLOWING = [es.Never(), es.Every(3), es.Always()]
@@ -40,7 +44,7 @@ def blow(x: wp.vec2d, t: wp.float64) -> wp.vec2d:
     return f
 
 
-def run(k, dim=2, material=RUBBER, speed=8.0, **options):
+def run(k, dim=2, material=RUBBER, speed=8.0, name=None, **options):
     """Body number ``k``: stiffer than the one before, and somewhere else."""
     x, volume = cloud(dim, SIDE[dim], jitter=0.1)
     x[:, 0] += 2.0 * k
@@ -51,7 +55,7 @@ def run(k, dim=2, material=RUBBER, speed=8.0, **options):
     }
     velocity = speed * np.random.default_rng(k).normal(size=x.shape)
     material = dataclasses.replace(material, **stiffer)
-    return es.Body(x=x, volume=volume, material=material, velocity=velocity, name=f"run {k}", **options)
+    return es.Body(x=x, volume=volume, material=material, velocity=velocity, name=name or f"run {k}", **options)
 
 
 def sides(**options):
@@ -115,30 +119,35 @@ def test_liquids(simd):
     compare([[run(k, material=WATER, speed=0.3)] for k in range(RUNS)], unit=0.1)
 
 
+@pytest.mark.parametrize("simd", [False, True])
 @pytest.mark.parametrize("options", [{}, MOVING], ids=["total Lagrangian", "Eulerian"])
-def test_yielding_by_portable_laws(options):
-    """On the CPU metal alone goes eight particles at once, which differs by round-off."""
-    execution.set_simd(False)
+def test_yielding_eight_at_once_and_one_by_one(options, simd):
+    execution.set_simd(simd)
     compare([[run(k, material=METAL, speed=300.0)] for k in range(RUNS)], unit=1e-3, **options)
 
 
-def test_yielding_eight_at_once_differs_by_round_off():
-    bodies = [run(k, material=METAL, speed=300.0) for k in range(RUNS)]
-    together, alone = es.Simulation(bodies, independent=True), es.Simulation(bodies[1])
-    for simulation in (together, alone):
-        simulation.run(until=5e-4)
-    here = together.runs.ranges[1]
-    assert together.history("plastic_strain")[here].max() > 0.01
-    assert together.x[here] == pytest.approx(alone.x, abs=1e-12)
+def test_eight_at_once_of_one_law():
+    """Bodies of equal constants do not share blocks either: steps differ."""
+    bodies = [run(0, material=METAL, speed=300.0 * (1 + k), name=f"{k}") for k in range(RUNS)]
+    compare([[body] for body in bodies], unit=3e-4)
 
 
-def test_bonded_bodies_are_one_run():
+def test_runs_of_several_media():
+    """Elastic, liquid and yielding, each by the options that suit it, and two of one medium."""
+    metal = {"material": METAL, "speed": 3.0}
+    bodies = [run(0), run(1, material=WATER, speed=0.3), run(2, **metal), run(3, **metal)]
+    together = compare([[body] for body in bodies], unit=2e-4)
+    assert len(together.stepper.media) == 3
+
+
+@pytest.mark.parametrize("options", [{}, {"material": METAL, "speed": 300.0}], ids=["rubber", "metal"])
+def test_bonded_bodies_are_one_run(options):
     pairs = []
     for k in range(RUNS):
-        one = run(k)
+        one = run(k, **options)
         other = dataclasses.replace(one, x=one.x + np.array([0.0, 1.0]), name=f"bonded {k}", bonded=one.name)
         pairs.append([one, other])
-    together = compare(pairs)
+    together = compare(pairs, unit=1e-3 if options else 0.01)
     assert together.runs.bodies[2] == ("run 2", "bonded 2") and len(together.runs) == RUNS
 
 
@@ -266,6 +275,30 @@ def test_resume_is_exact(reference, tmp_path):
         whole.runs.failures[1].step,
     )
     assert resumed.runs.failures[0] is None
+
+
+def test_a_directory_keeps_and_resumes_them(tmp_path):
+    """And says which ended, and how far each came."""
+
+    def build():
+        return es.Simulation([run(k) for k in range(RUNS)], boundaries=BLOW, independent=True)
+
+    kept = Recording(snapshots=EveryTime(0.002), fields=["velocity", "run_time"], dtype=np.float64)
+    whole, resumed = build(), build()
+    record(whole, tmp_path / "whole", 0.008, kept)
+    stop = StopAfter(13)
+    stopped = record(build(), tmp_path / "cut", 0.008, kept, stop=stop, watch=stop.watch)
+    assert stopped.stopped is not None and stopped.time < 0.008
+    record(resumed, tmp_path / "cut", 0.008, kept, resume=True)
+    assert np.array_equal(whole.x, resumed.x, equal_nan=True)
+    assert np.array_equal(whole.runs.steps, resumed.runs.steps)
+    for one, other in zip(Run(tmp_path / "whole"), Run(tmp_path / "cut"), strict=True):
+        assert one.time == other.time and np.array_equal(one["velocity"], other["velocity"], equal_nan=True)
+    last = Run(tmp_path / "whole")[-1]
+    reached = [np.unique(last["run_time"][numbers]).tolist() for numbers in whole.runs.ranges]
+    assert reached == [[0.008], [whole.runs.failures[1].time], [0.008]]
+    status = json.loads((tmp_path / "whole" / "status.json").read_text())
+    assert status["state"] == "done" and status["ended"] == [str(whole.runs.failures[1])]
 
 
 class Blind(Boundary):

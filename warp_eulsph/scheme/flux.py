@@ -1,8 +1,10 @@
 """The flux of momentum: stress in the reference, body by body (M1), the wave speeds there, and what laws remember."""
 
 from collections.abc import Callable, Sequence
+from itertools import groupby, pairwise
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from ..execution import Launcher, simd
@@ -33,6 +35,13 @@ def check_reference(materials: Sequence[Material], policy: ReferencePolicy) -> N
             )
 
 
+def _blocks(sizes: Sequence[int], device: wp.DeviceLike) -> wp.array:
+    """First particles of blocks of eight, of bodies of these ``sizes`` each by itself, and the end."""
+    starts = np.cumsum([0, *sizes])
+    blocks = [np.arange(start, end, EIGHT) for start, end in pairwise(starts)]
+    return wp.array(np.concatenate([*blocks, starts[-1:]]), dtype=wp.int32, device=device)
+
+
 class Flux:
     """Stress, wave speeds, stored energy and histories of all bodies; a launch per kind of law and quantity.
 
@@ -52,6 +61,8 @@ class Flux:
         self._launch, self._simd = Launcher(device), simd(device)
         self.kinds = kinds_of(space, bodies, particles, device)
         self.parts = [part for kind in self.kinds for part in kind.parts]
+        self._constants = [material.constants() for material, _ in bodies]
+        self._blocks = {kind.first: None if kind.several else _blocks([kind.size], device) for kind in self.kinds}
         n = sum(part.size for part in self.parts)
         remembers = any(part.law.history for part in self.parts)
         empty = ["Pi", "tie", "drag", "secant", "tied", "slipped"] + ([] if remembers else ["dissipated"])
@@ -74,9 +85,19 @@ class Flux:
         if not len(self.fields.dissipated):
             self.fields.dissipated = wp.zeros_like(self.fields.speed)
 
-    def go_one_by_one(self) -> None:
-        """Ask laws for one particle at once: eight at once may be of runs with steps of their own."""
-        self._simd = False
+    def go_run_by_run(self, groups: Sequence[int]) -> None:
+        """Ask laws for eight particles at once of one run, which have one step: bodies of these ``groups``, one each.
+
+        Where constants differ within a run laws are asked for one particle at once, as they are for it alone.
+        """
+        number = 0
+        for kind in self.kinds:
+            own = range(number, number + len(kind.parts))
+            runs = [list(bonded) for _, bonded in groupby(own, lambda k: groups[k])]
+            alike = all(self._constants[k] == self._constants[run[0]] for run in runs for k in run)
+            sizes = [sum(self.parts[k].size for k in run) for run in runs]
+            self._blocks[kind.first] = _blocks(sizes, self.device) if alike else None
+            number = own.stop
 
     def moduli(self) -> list[tuple[float, float]]:
         """Moduli of pressure and of shear waves at F = I [Pa] of each body; reads the device."""
@@ -104,7 +125,7 @@ class Flux:
                 kind,
                 [*arguments, kind.laws, self.fields],
                 lambda law, several: kernels.make_flux(space, law, several, fixed, dual),
-                lambda law, eights: flux_eights.make_flux(space, law, eights, fixed, dual),
+                lambda law, eights, several: flux_eights.make_flux(space, law, eights, several, fixed, dual),
             )
 
     def wave_speeds(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
@@ -116,7 +137,7 @@ class Flux:
                 kind,
                 [*arguments, kind.laws, self.fields, clock],
                 lambda law, several: kernels.make_wave_speeds(space, law, several, fixed),
-                lambda law, eights: flux_eights.make_wave_speeds(space, law, eights, fixed),
+                lambda law, eights, several: flux_eights.make_wave_speeds(space, law, eights, several, fixed),
             )
 
     def energy(self, F: wp.array, out: wp.array) -> None:
@@ -128,7 +149,7 @@ class Flux:
                 kind,
                 arguments,
                 lambda law, several: kernels.make_energy(space, law, several),
-                lambda law, eights: flux_eights.make_energy(space, law, eights),
+                lambda law, eights, several: flux_eights.make_energy(space, law, eights, several),
             )
 
     def update(self, F: wp.array, grad_v: wp.array, configuration: Configuration, clock: ClockArrays) -> None:
@@ -144,7 +165,9 @@ class Flux:
                     lambda law, several: kernels.make_update(
                         space, law, several, fixed, law.secant is not None and tied
                     ),
-                    lambda law, eights: flux_eights.make_update(space, law, eights, law.secant is not None and tied),
+                    lambda law, eights, several: flux_eights.make_update(
+                        space, law, eights, several, law.secant is not None and tied
+                    ),
                 )
             elif law.update is not None:
                 kernel = kernels.make_forget(self.space, law, kind.several)
@@ -155,14 +178,15 @@ class Flux:
         kind: Kind,
         arguments: Sequence[Any],
         make: Callable[[Law, bool], wp.Kernel],
-        make_of_eights: Callable[[Law, Eights], wp.Kernel],
+        make_of_eights: Callable[[Law, Eights, bool], wp.Kernel],
     ) -> None:
         """Launch over the particles of a kind, eight at once where that is to be done."""
-        law = kind.law
-        if law.eights is None or kind.several or not self._simd:
+        law, blocks = kind.law, self._blocks[kind.first]
+        if law.eights is None or blocks is None or not self._simd:
             self._launch(make(law, kind.several), kind.size, arguments, kind.first)
         else:
-            self._launch(make_of_eights(law, law.eights), -(-kind.size // EIGHT), arguments, each=EIGHT)
+            kernel = make_of_eights(law, law.eights, kind.several)
+            self._launch(kernel, len(blocks) - 1, [blocks, *arguments], each=EIGHT)
 
     def rebase(self, F: wp.array) -> None:
         """Before a refresh: F and histories as the new reference takes them."""

@@ -1,6 +1,8 @@
 """Stress, waves, energy and histories of laws that have them for eight particles at once (``Law.eights``): on the CPU.
 
-A thread has a block of eight particles of one kind of law. Parameters are those of the kernels of ``flux_kernels.py``.
+A thread has a block of eight particles of one kind of law, fewer at the end of it, and of each independent run, which
+has a step and constants of its own. Block k begins with particle ``blocks[k]`` of the kind; other parameters are those
+of the kernels of ``flux_kernels.py``.
 """
 
 import functools
@@ -10,37 +12,45 @@ import warp as wp
 from ..fields import clock_structure, structure
 from ..materials import Law
 from ..materials.base import Eights, history_row
-from ..materials.in_eights import EIGHT, block_structure
+from ..materials.in_eights import block_structure
 from ..space import Space
 from .flux_kernels import keep_flux, keep_speeds, keep_update
-from .laws import laws_structure
+from .laws import constants_of_body, laws_structure
 
 
 @functools.cache
 def block_of(space: Space, law: Law) -> wp.Function:
-    """``wp.func`` (number of a thread, first particle of the kind, F, history) -> the thread's block."""
+    """``wp.func`` (number of a thread, where blocks begin, first particle of the kind, F, history) -> its block."""
     mat, row = space.mat, history_row(space, law)
     Block = block_structure(mat, row)
 
     @wp.func
-    def block_of(thread: int, begin: int, F: wp.array(dtype=mat), history: wp.array(dtype=row)) -> Block:
-        own = thread * EIGHT
-        return Block(F, history, begin + own, own, wp.min(len(history) - own, EIGHT))
+    def block_of(
+        thread: int,
+        blocks: wp.array(dtype=wp.int32),
+        begin: int,
+        F: wp.array(dtype=mat),
+        history: wp.array(dtype=row),
+    ) -> Block:
+        own = blocks[thread]
+        return Block(F, history, begin + own, own, blocks[thread + 1] - own)
 
     return block_of
 
 
 @functools.cache
-def make_flux(space: Space, law: Law, eights: Eights, fixed: bool, dual: bool) -> wp.Kernel:
+def make_flux(space: Space, law: Law, eights: Eights, several: bool, fixed: bool, dual: bool) -> wp.Kernel:
     """Kernel: Q, and Π if it is kept."""
     mat, row, real, stress = space.mat, history_row(space, law), space.real, eights.stress
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Laws, Clock, keep = laws_structure(law), clock_structure(space), keep_flux(space, fixed, dual)
     take = block_of(space, law)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def compute_flux(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
@@ -52,8 +62,9 @@ def make_flux(space: Space, law: Law, eights: Eights, fixed: bool, dual: bool) -
         laws: Laws,
         flux: Flux,
     ):
-        block = take(first + wp.tid(), begin, F, history)
-        stress(block, real(fraction * clock.dt[0]), laws.constants[0], flux.Q)
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        ahead = real(fraction * clock.dt[clock.run[block.first]])
+        stress(block, ahead, constants_of(block.first, particles, laws), flux.Q)
         if wp.static(dual or not fixed):
             for a in range(block.first, block.first + block.count):
                 keep(a, flux.Q[a], reference, flux)
@@ -62,16 +73,18 @@ def make_flux(space: Space, law: Law, eights: Eights, fixed: bool, dual: bool) -
 
 
 @functools.cache
-def make_wave_speeds(space: Space, law: Law, eights: Eights, fixed: bool) -> wp.Kernel:
+def make_wave_speeds(space: Space, law: Law, eights: Eights, several: bool, fixed: bool) -> wp.Kernel:
     """Kernel: the wave speeds."""
     mat, row, pair, moduli = space.mat, history_row(space, law), space.row(2), eights.wave_moduli
     Particles, Reference, Flux = structure(space, "Particles"), structure(space, "Reference"), structure(space, "Flux")
     Laws, Clock, keep = laws_structure(law), clock_structure(space), keep_speeds(space, law, fixed)
     take = block_of(space, law)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def wave_speeds(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
@@ -82,7 +95,8 @@ def make_wave_speeds(space: Space, law: Law, eights: Eights, fixed: bool) -> wp.
         flux: Flux,
         clock: Clock,
     ):
-        block, c = take(first + wp.tid(), begin, F, history), laws.constants[0]
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        c = constants_of(block.first, particles, laws)
         M = moduli(block, c)
         for k in range(block.count):
             a, of_a = block.first + k, pair(M[0, k], M[1, k])
@@ -92,14 +106,16 @@ def make_wave_speeds(space: Space, law: Law, eights: Eights, fixed: bool) -> wp.
 
 
 @functools.cache
-def make_energy(space: Space, law: Law, eights: Eights) -> wp.Kernel:
+def make_energy(space: Space, law: Law, eights: Eights, several: bool) -> wp.Kernel:
     """Kernel: the stored energy."""
     mat, row, density = space.mat, history_row(space, law), eights.energy
     Particles, Laws, take = structure(space, "Particles"), laws_structure(law), block_of(space, law)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def energy(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         history: wp.array(dtype=row),
@@ -107,8 +123,8 @@ def make_energy(space: Space, law: Law, eights: Eights) -> wp.Kernel:
         laws: Laws,
         out: wp.array(dtype=wp.float64),
     ):
-        block = take(first + wp.tid(), begin, F, history)
-        density(block, laws.constants[0], out)
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        density(block, constants_of(block.first, particles, laws), out)
         for a in range(block.first, block.first + block.count):
             out[a] = wp.float64(particles.V0[a]) * out[a]
 
@@ -116,15 +132,17 @@ def make_energy(space: Space, law: Law, eights: Eights) -> wp.Kernel:
 
 
 @functools.cache
-def make_update(space: Space, law: Law, eights: Eights, tied: bool) -> wp.Kernel:
+def make_update(space: Space, law: Law, eights: Eights, several: bool, tied: bool) -> wp.Kernel:
     """Kernel: the history after a full step and the energy that it dissipated; a step of no length changes nothing."""
     real, mat, row, keep = space.real, space.mat, history_row(space, law), keep_update(space, law, tied)
     Particles, Reference, Clock = structure(space, "Particles"), structure(space, "Reference"), clock_structure(space)
     Flux, Laws, updated, take = structure(space, "Flux"), laws_structure(law), eights.update, block_of(space, law)
+    constants_of = constants_of_body(space, law, several)
 
     @wp.kernel(module="unique", enable_backward=False)
     def update(
         first: int,
+        blocks: wp.array(dtype=wp.int32),
         begin: int,
         F: wp.array(dtype=mat),
         grad_v: wp.array(dtype=mat),
@@ -135,7 +153,8 @@ def make_update(space: Space, law: Law, eights: Eights, tied: bool) -> wp.Kernel
         laws: Laws,
         flux: Flux,
     ):
-        block, dt, c = take(first + wp.tid(), begin, F, history), real(clock.dt[0]), laws.constants[0]
+        block = take(first + wp.tid(), blocks, begin, F, history)
+        dt, c = real(clock.dt[clock.run[block.first]]), constants_of(block.first, particles, laws)
         if dt > real(0.0):
             updated(block, dt, c, flux.dissipated)
         for k in range(block.count):

@@ -77,7 +77,7 @@ class Medium:
         self._launch = Launcher(device)
         self.options, self.policy, self.span = parts.options, parts.policy, parts.span
         self.particles, self.flux, self.configuration = parts.particles, parts.flux, parts.configuration
-        self.surface_given = parts.surface_given
+        self.surface_given, self._groups = parts.surface_given, parts.groups
         options, n = self.options, self.n
         self.shifter: Shifter | None = None
         if options.shifting is not None and not self.policy.fixed:
@@ -136,7 +136,7 @@ class Medium:
         self.clock, self.moves_surfaces = clock, moves_surfaces
         self.waiting = Waiting(self.space, [], clock, self.device)
         if clock.every > 0:
-            self.flux.go_one_by_one()
+            self.flux.go_run_by_run(self._groups)
         upwind, flux = self.options.dissipation, self.flux.fields
         epsilon = 0.0 if upwind is None else upwind.epsilon
         d = None if upwind is None or upwind.sensor is None else self.sensors[upwind.sensor].d
