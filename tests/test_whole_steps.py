@@ -31,14 +31,6 @@ def driven(failing=lambda call: None):
     return es.Simulation(body, boundaries=[held, es.BodyForce(load)])
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _listening():
-    """To Ctrl-C, which a process that a shell started in the background ignores."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.fixture(scope="module")
 def undisturbed():
     simulation = driven()
