@@ -198,7 +198,7 @@ def test_steps_record_their_launches_once():
         simulation.stepper.configuration.lists,
     )
     owners = [stepper, stepper.flux, stepper.ledger, stepper.clock, stepper.configuration, lists, lists.cells]
-    owners += [stabiliser, stabiliser._in_one_pass]
+    owners += [stabiliser, stabiliser._by_simd]
     recorded = []
     for _ in range(4):
         simulation.step(4)

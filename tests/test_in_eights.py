@@ -13,6 +13,7 @@ from warp_eulsph.geometry import box
 from warp_eulsph.materials import J2
 from warp_eulsph.materials.base import history_row
 from warp_eulsph.materials.in_eights import EIGHT
+from warp_eulsph.scheme.flux_eights import block_of
 
 SPACES = [Space(dim, real) for dim in (1, 2, 3) for real in (wp.float32, wp.float64)]
 COUNT = 5 * EIGHT + 3
@@ -24,7 +25,7 @@ def make_both(space, law):
     """Kernels: half step's stress, update, and then stress and energy, singly and by eights."""
     real, mat, row, C = space.real, space.mat, history_row(space, law), law.Constants
     stress, energy, moduli, update, pair = law.stress, law.energy, law.wave_moduli, law.update, space.row(2)
-    stress_of, energy_of, moduli_of, update_of = law.eights
+    (stress_of, energy_of, moduli_of, update_of), take = law.eights, block_of(space, law)
 
     @wp.kernel(module="unique", enable_backward=False)
     def singly(
@@ -57,15 +58,14 @@ def make_both(space, law):
         lost: wp.array(dtype=real),
         M: wp.array(dtype=pair),
     ):
-        a = wp.tid() * EIGHT
-        count = wp.min(len(h) - a, EIGHT)
-        stress_of(F, h, a, a, count, real(1.0), c, ahead)
-        update_of(F, h, a, a, count, real(1.0), c, lost)
-        stress_of(F, h, a, a, count, real(0.0), c, P)
-        energy_of(F, h, a, a, count, c, W)
-        both = moduli_of(F, h, a, a, count, c)
-        for k in range(count):
-            M[a + k] = pair(both[0, k], both[1, k])
+        block = take(wp.tid(), 0, F, h)
+        stress_of(block, real(1.0), c, ahead)
+        update_of(block, real(1.0), c, lost)
+        stress_of(block, real(0.0), c, P)
+        energy_of(block, c, W)
+        both = moduli_of(block, c)
+        for k in range(block.count):
+            M[block.first + k] = pair(both[0, k], both[1, k])
 
     return singly, by_eights
 

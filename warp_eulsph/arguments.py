@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from .body import Body
+from .boundaries import Assembly
 from .checks import instance, positive, short
 from .overlap import Encounters
 from .scheme.arrangement import Arrangement
@@ -36,6 +37,16 @@ def check_options(
         instance(weight, Weight, "weight", "CubicSpline()")
     if dilation is not None:
         positive(dilation, "dilation", "1.3 is the tested value")
+
+
+def bound(option: Any, kind: type, assembly: Assembly) -> Any:
+    """What a condition or an interaction is at work.
+
+    Raises:
+        ValueError: its ``bind`` returns no ``kind``.
+    """
+    who = f"what {type(option).__name__}.bind(assembly) returns"
+    return instance(option.bind(assembly), kind, who, f"a {kind.__name__}, made of option and assembly")
 
 
 def checked_dtype(given: Any) -> Any:

@@ -211,14 +211,19 @@ def check_neighbourhoods(world: World, bodies: Sequence[Body]) -> None:
         if close.size:
             raise ValueError(
                 f"particles of a body must not coincide, got {close.size} with a neighbour closer than 1e-6 spacings; "
-                f"the first is {who(first + int(close[0]))}; remove duplicates"
+                f"the first is {who(first + int(close[0]))}; remove duplicates; in float32 the "
+                "origin must be near the bodies"
             )
         poor = np.flatnonzero(configuration.poor.numpy())
         if poor.size:
-            neighbours = configuration.lists.lengths[poor[0]]
+            a = int(poor[0])
+            own = next(numbers for numbers in ranges_of(bodies).values() if first + a in numbers)
+            away = np.delete(np.linalg.norm(X[own.start : own.stop] - X[first + a], axis=1), first + a - own.start)
+            spacings = float(away.min(initial=np.inf)) / float(medium.particles.spacing.numpy()[a])
             raise ValueError(
                 f"the neighbours of a particle must span all {world.space.dim} directions, {poor.size} particles lack "
-                f"some; the first is {who(first + int(poor[0]))} with {neighbours} neighbours within "
-                f"h = {medium.particles.h.numpy()[poor[0]]:.6g} m times {configuration.weight.support}; "
-                "increase dilation, check spacing, or use at least 2 particles across each direction"
+                f"some; the first is {who(first + a)} with {configuration.lists.lengths[a]} neighbours within "
+                f"h = {medium.particles.h.numpy()[a]:.6g} m times {configuration.weight.support}, the nearest of its "
+                f"body {spacings:.3g} spacings away; that is 1 where x, volume and spacing have one unit; dilation is "
+                "1.3 or somewhat more, and at least 2 particles lie across each direction"
             )

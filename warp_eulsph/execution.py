@@ -109,6 +109,19 @@ def graphs(device: wp.DeviceLike, n: int) -> bool:
     return n < 2 * LEAST_RANGE if on_cpu else wp.is_conditional_graph_supported()
 
 
+def device_of(given: wp.DeviceLike) -> wp.Device:
+    """The device that is meant.
+
+    Raises:
+        ValueError: it is not here.
+    """
+    try:
+        return wp.get_device(given)
+    except (ValueError, RuntimeError) as error:
+        here = [device.alias for device in wp.get_devices()]
+        raise ValueError(f"device must be one of {here}, got {given!r}; None takes Warp's default") from error
+
+
 class Launcher:
     """Launches of one object on one device, recorded: a repeated one costs a fifth of ``wp.launch``.
 

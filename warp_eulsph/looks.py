@@ -99,7 +99,8 @@ class Looks:
         shapes = [values.shape[1:] for values in found if values is not None]
         if not shapes:
             known = sorted({variable.name for _, part in bodies for variable in part.law.history})
-            raise ValueError(f"history must be one of {known}, which the materials remember, got {name!r}")
+            what = f"must be one of {known}, which the" if known else "has no names, for these"
+            raise ValueError(f"history {what} materials remember{'' if known else ' nothing'}, got {name!r}")
         out = np.full((len(self.particles.mass), *shapes[0]), np.nan, dtype=self.space.numpy)
         for (span, _), values in zip(bodies, found, strict=True):
             if values is not None:

@@ -33,7 +33,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.Devi
     d, vectors = space.dim, simd(device)
     sizes = {"real": 1, "vec": d, "mat": d * d, "int": 0}
     absent = {"Forces.correction", "Forces.external", "Forces.damping", "Flux.drag", "Particles.group", *_OF_YIELDING}
-    absent |= {"Flux.Pi"} if vectors else set()
+    absent |= {"Flux.Pi"} if vectors or not moving else set()
     moved = {"Reference.resolution", "Reference.moment", "Flux.tie", "Forces.tie"}
     absent |= moved if moving else {"Reference.F", "Reference.balanced"}
     present = [
@@ -45,7 +45,7 @@ def bytes_per_particle(space: Space, reach: float, moving: bool, device: wp.Devi
         reals += LANES * ((3 if moving else 4) + 2 * d)
     else:
         ints += 1  # stop
-        reals += 0 if moving else LANES * d + d * d  # ∇v or Π; ∇v F⁻¹
+        reals += 0 if moving else 2 * LANES * d + 3  # ∇v or Π, Π̃; spin of ∇v F⁻¹
     if moving:
         reals += d + d * d + 3 * d + 3  # surface vectors of the half step, K, M13, places
         ints += 1

@@ -33,6 +33,7 @@ def explain_mistakes(names: Iterable[str], where: dict[str, Any]) -> None:
 
 def _explaining(cls: type, others: list[Any]) -> Any:
     init: Any = vars(cls)["__init__"]
+    init = getattr(init, "explained", init)  # by a package whose front door knows fewer classes
     signature = inspect.signature(init)
     taken = tuple(signature.parameters)[1:]
 
@@ -47,11 +48,14 @@ def _explaining(cls: type, others: list[Any]) -> Any:
             raise TypeError(_unknown(cls, taken, unknown[0], others))
         try:
             init(self, *args, **options)  # whose own messages say more
-        except (TypeError, AttributeError):
+        except (TypeError, AttributeError) as error:
             check(args, options)
+            if str(error).startswith(f"{cls.__name__}.__init__()"):
+                error.args = (f"{error}. {_takes(cls, signature)}",)
             raise
         check(args, options)
 
+    explaining.explained = init  # type: ignore[attr-defined]
     return explaining
 
 
@@ -64,8 +68,16 @@ def _unknown(cls: type, taken: tuple[str, ...], name: str, others: list[Any]) ->
         hint = f"; {' and '.join(takers[:3])} {'does' if len(takers) == 1 else 'do'}"
     else:
         hint = ""
-    what = f"takes {', '.join(taken)}" if taken else "has no options"
-    return f"{cls.__name__} takes no {name!r}{hint}. {cls.__name__} {what}"
+    return f"{cls.__name__} takes no {name!r}{hint}. {_takes(cls, inspect.signature(cls))}"
+
+
+def _takes(cls: type, signature: inspect.Signature) -> str:
+    """Words on the arguments of a class, in their order."""
+    taken = {name: argument.kind for name, argument in signature.parameters.items() if name != "self"}
+    if not taken:
+        return f"{cls.__name__} has no options"
+    by_name = ", all by name" if set(taken.values()) == {inspect.Parameter.KEYWORD_ONLY} else ""
+    return f"{cls.__name__} takes {', '.join(taken)}{by_name}"
 
 
 @functools.cache

@@ -9,7 +9,7 @@ import functools
 
 import warp as wp
 
-from .space import Space
+from .space import Space, vector_type
 
 LANES = 4  # of a row
 ALIGNMENT = 64  # bytes, a cache line
@@ -27,6 +27,27 @@ def packed_rows(space: Space, n: int, vectors: int, device: wp.DeviceLike, withi
     room = wp.zeros(size + ALIGNMENT // item, dtype=space.real, device=device)
     skip = (-(room.ptr or 0) % ALIGNMENT) // item
     return room[skip : skip + size].reshape((n, vectors * LANES))
+
+
+@functools.cache
+def four_of(space: Space) -> wp.Function:
+    """``wp.func`` (rows, a, m) -> four reals of packed rows, from 4 m on in that of a: for portable kernels.
+
+    GPUs read 16 bytes at a time, where the compiler may take it that they lie on such a boundary.
+    """
+    real, vec4 = space.real, vector_type(LANES, space.real)
+    name = "double" if real is wp.float64 else "float"
+
+    @wp.func_native(f"""
+    struct alignas(16) Four {{ {name} c[{LANES}]; }};
+    const Four four = ((const Four*)(rows.data + (size_t)a * rows.shape[1]))[m];
+    wp::vec_t<{LANES}, {name}> out;
+    for (int i = 0; i < {LANES}; ++i) out.c[i] = four.c[i];
+    return out;
+    """)
+    def four_of(rows: wp.array2d(dtype=real), a: int, m: int) -> vec4: ...
+
+    return four_of
 
 
 def _lanes(*of_row: int) -> str:

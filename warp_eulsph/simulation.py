@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .arguments import check_options, warn
+from .arguments import bound, check_options, warn
 from .body import Body, checked_bodies
-from .boundaries import Assembly, Boundary
+from .boundaries import Assembly, Bound, Boundary
 from .building import Given, check_neighbourhoods, make_particles, make_state, plan_media, ranges_of
 from .checks import check_restorable, checked_box, objects, real_number, whole_number
 from .diagnostics import Diagnostics
-from .execution import graphs
+from .execution import device_of, graphs
 from .failure import failure, look_at_matter
-from .interactions import Interaction
+from .interactions import BoundInteraction, Interaction
 from .looks import Looks
 from .memory import check_memory
 from .order import Order
@@ -93,7 +93,7 @@ class Simulation(Looks):
         check_options(reference, arrangement, scheme, time_step, weight, dilation, dtype)
         X = np.concatenate([body.x for body in self.bodies])
         self.space = Space(X.shape[1], dtype, periodic is not None)
-        self.device = wp.get_device(device)
+        self.device = device_of(device)
         self.boundaries = tuple(objects(boundaries, Boundary, "boundaries", "Fixed(lambda X: X[:, 0] < 0.1)"))
         self.interactions = tuple(objects(interactions, Interaction, "interactions", "an Interaction"))
         self.reference, self.arrangement = reference, arrangement
@@ -108,8 +108,8 @@ class Simulation(Looks):
         self.order = Order(len(X), self.device)
         surface_given = self.bodies[0].surface is not None
         assembly = Assembly(self.space, self.device, X, self.particles, self.ranges, self.order, surface_given)
-        self.conditions = [boundary.bind(assembly) for boundary in self.boundaries]
-        self.bound_interactions = [interaction.bind(assembly) for interaction in self.interactions]
+        self.conditions = [bound(boundary, Bound, assembly) for boundary in self.boundaries]
+        self.bound_interactions = [bound(each, BoundInteraction, assembly) for each in self.interactions]
         touching = {two for interaction in self.bound_interactions for two in interaction.touching}
         unmet = (self.particles.share.numpy() == 0.0) | independent
         self.encounters = Encounters(self.bodies, unmet, box, touching)
@@ -367,6 +367,6 @@ class Simulation(Looks):
     def reaction(self, boundary: Boundary) -> np.ndarray:
         """Force [N] that a velocity condition exerted on its particles, mean over the last step, (dim,)."""
         if boundary not in self.boundaries:
-            raise ValueError(f"reaction: {boundary!r} is not one of the simulation's {len(self.boundaries)} boundaries")
+            raise ValueError(f"reaction: {boundary!r} is not one of simulation.boundaries; give one of these")
         numbers = self.conditions[self.boundaries.index(boundary)].indices
         return self.stepper.forces.reaction.numpy()[self.order.places[numbers]].sum(axis=0)

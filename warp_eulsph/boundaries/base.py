@@ -54,7 +54,12 @@ class Assembly:
             chosen = np.arange(n)
         elif callable(region):
             check_takes(region, 1, f"{who}: region", "lambda X: X[:, 0] < 0.1")
-            chosen = np.flatnonzero(_mask(region(read_only(self.X)), self.X, who))
+            try:
+                given = region(read_only(self.X))
+            except Exception as error:
+                error.add_note(f"{who}: in the function of its region, for positions of shape {self.X.shape}")
+                raise
+            chosen = np.flatnonzero(_mask(given, self.X, who))
         else:
             chosen = _indices(region, n, who)
         if body is not None:

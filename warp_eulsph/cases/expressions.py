@@ -8,6 +8,7 @@ import ast
 import difflib
 import functools
 import linecache
+import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import warp as wp
 from ..space import Space
 
 LONGEST = 1000  # characters
+_WITH_UNIT = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?\s*[a-z%°][\w/^*-]*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,8 @@ def parse(
         is_truth = _check(tree, (*names, *usable), found)
     except (SyntaxError, RecursionError, MemoryError) as error:
         reason = error.msg if isinstance(error, SyntaxError) else "too deeply nested"
-        raise ValueError(f"not a formula: {text!r} ({reason})") from None
+        hint = "; numbers are in SI units and have none written" if _WITH_UNIT.fullmatch(text) else ""
+        raise ValueError(f"not a formula: {text!r} ({reason}){hint}") from None
     if is_truth != truth:
         wanted, got = ("a comparison such as 'y < 0.1'", "a number") if truth else ("a number", "a comparison")
         raise ValueError(f"must be {wanted}, got {got}: {text!r}")

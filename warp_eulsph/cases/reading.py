@@ -195,7 +195,7 @@ def _explained(error: ValidationError, data: Any, context: Reading) -> list[str]
     lines: list[str] = []
     for item in error.errors(include_url=False):
         path, table = _place(item["loc"], data, item["type"])
-        text = _message(item, table, context)
+        text = _message(item, table, data, context)
         lines += [f"{path}: {text}"] if path else text.splitlines()
     return lines
 
@@ -218,11 +218,13 @@ def _place(location: tuple[Any, ...], data: Any, kind: str) -> tuple[str, Any]:
     return ".".join(parts), table
 
 
-def _message(item: Any, table: Any, context: Reading) -> str:
+def _message(item: Any, table: Any, data: Any, context: Reading) -> str:
     kind, given, extra = item["type"], item.get("input"), item.get("ctx", {})
     name = item["loc"][-1] if item["loc"] else ""
     if kind == "extra_forbidden":
         known = context.keys.get(id(table), [])
+        if len(item["loc"]) > 1 and name in context.keys.get(id(data), []):
+            return f"unknown key; it is one of the case: write it above the first [table]; known here are {known}"
         return f"unknown key{nearest(name, known)}; known are {known}"
     if kind == "missing":
         return "is missing"

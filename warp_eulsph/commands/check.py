@@ -25,8 +25,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..output import BusyError, RunDirectory, check, recover
 
     try:
-        if not RunDirectory(arguments.directory).holds_a_run:
-            raise FileNotFoundError(f"no run in {arguments.directory}")
+        if not (home := RunDirectory(arguments.directory)).holds_a_run:
+            raise FileNotFoundError(home.without_a_run)
         if arguments.recover:
             for line in recover(arguments.directory):
                 print(line)

@@ -36,9 +36,9 @@ def run(arguments: argparse.Namespace) -> int:
     start_logging()
     home = RunDirectory(arguments.directory)
     try:
-        kept = home.read(home.description)
+        kept = home.read(home.description) if not home.path.is_file() else None
         if not kept:
-            raise ValueError(f"no run in {home.path}: run.json is not there")
+            raise ValueError(home.without_a_run)
         origin = kept.get("case")
         if not origin:
             raise ValueError(

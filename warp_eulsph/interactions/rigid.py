@@ -68,6 +68,8 @@ class RigidBody(Interaction):
     def __post_init__(self) -> None:
         if not (np.isfinite(real_number(self.friction, "RigidBody: friction")) and self.friction >= 0.0):
             raise ValueError(f"RigidBody: friction must be 0 or more and finite, got {self.friction}")
+        if isinstance(self.bodies, str):
+            raise ValueError(f"RigidBody: bodies must be a list of names, got {self.bodies!r}; write [{self.bodies!r}]")
 
     def bind(self, assembly: Assembly) -> "BoundRigidBody":
         if self.hollow and isinstance(self.motion, Free):

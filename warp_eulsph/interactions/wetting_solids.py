@@ -28,6 +28,31 @@ def _grid_vector(space: Space) -> Any:
 
 
 @functools.cache
+def _shore_structure(space: Space) -> Any:
+    """A liquid and the solids in its sums, as both were in the present reference.
+
+    Of the solids' particles ``at`` [m], ``V`` [m^d], ``places`` in memory, (m,), and ``solids``, their grid; of the
+    liquid's ``own`` [m], their places ``members``, (n,), from ``offset`` on, ``liquid``, their grid, and ``longest``,
+    the largest smoothing length [m].
+    """
+    vec3 = _grid_vector(space)
+
+    @wp.struct
+    class Shore:
+        solids: wp.uint64
+        at: wp.array(dtype=vec3)
+        V: wp.array(dtype=space.real)
+        places: wp.array(dtype=wp.int32)
+        liquid: wp.uint64
+        own: wp.array(dtype=vec3)
+        members: wp.array(dtype=wp.int32)
+        offset: int
+        longest: wp.array(dtype=space.real)
+
+    return Shore
+
+
+@functools.cache
 def _make_note(space: Space) -> wp.Kernel:
     """Kernel: where particles are, as 3-vectors for the grid."""
     vec, dim, real, vec3 = space.vec, space.dim, space.real, _grid_vector(space)
@@ -65,42 +90,37 @@ def _pair(weight: Weight, space: Space) -> wp.Function:
 @functools.cache
 def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: which particles of the liquid have solids in their sums, Σ_b |G_ab|, and L: whole across (M28)."""
-    vec, real, dim, vec3, pair = space.vec, space.real, space.dim, _grid_vector(space), _pair(weight, space)
+    vec, real, dim, Shore, pair = space.vec, space.real, space.dim, _shore_structure(space), _pair(weight, space)
     Reference, reach = structure(space, "Reference"), float(weight.support) * QUERY_MARGIN
     grow = grow_across(space)
 
     @wp.kernel(module="unique", enable_backward=False)
     def meet(
         first: int,
-        solids: wp.uint64,
-        at: wp.array(dtype=vec3),
-        V: wp.array(dtype=real),
-        own: wp.array(dtype=vec3),
-        members: wp.array(dtype=wp.int32),
-        offset: int,
+        shore: Shore,
         reference: Reference,
         kappa: wp.array(dtype=real),
         wet: wp.array(dtype=wp.int32),
         met: wp.array(dtype=real),
     ):
         k = first + wp.tid()
-        a = members[k] - offset
+        a = shore.members[k] - shore.offset
         total = vec()
         size = real(0.0)
         scatter = real(0.0)
-        for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
-            G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+        for i in wp.hash_grid_query(shore.solids, shore.own[k], real(reach) * reference.h[a]):
+            G = pair(shore.own[k], shore.at[i], reference.h[a], kappa[a] * shore.V[i])
             total += G
             size += wp.length(G)
         met[k] = size
         wet[k] = int(wp.length_sq(total) > real(0.0))
         if wet[k] == 1:
             n = wp.normalize(total)
-            for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
-                G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+            for i in wp.hash_grid_query(shore.solids, shore.own[k], real(reach) * reference.h[a]):
+                G = pair(shore.own[k], shore.at[i], reference.h[a], kappa[a] * shore.V[i])
                 xi = vec()
                 for j in range(wp.static(dim)):
-                    xi[j] = at[i][j] - own[k][j]
+                    xi[j] = shore.at[i][j] - shore.own[k][j]
                 scatter += real(0.5) * (wp.dot(G, xi) - wp.dot(G, n) * wp.dot(n, xi))
             across = real(0.0)
             if wp.static(dim > 1):
@@ -114,19 +134,13 @@ def _make_meet(weight: Weight, space: Space) -> wp.Kernel:
 @functools.cache
 def _make_gradient(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: ∇v_a += Σ_b (v_b − v_a) ⊗ G_ab."""
-    vec, mat, real, vec3, pair = space.vec, space.mat, space.real, _grid_vector(space), _pair(weight, space)
+    vec, mat, real, Shore, pair = space.vec, space.mat, space.real, _shore_structure(space), _pair(weight, space)
     Reference, reach = structure(space, "Reference"), float(weight.support) * QUERY_MARGIN
 
     @wp.kernel(module="unique", enable_backward=False)
     def add_gradient(
         first: int,
-        solids: wp.uint64,
-        at: wp.array(dtype=vec3),
-        V: wp.array(dtype=real),
-        places: wp.array(dtype=wp.int32),
-        own: wp.array(dtype=vec3),
-        members: wp.array(dtype=wp.int32),
-        offset: int,
+        shore: Shore,
         reference: Reference,
         kappa: wp.array(dtype=real),
         wet: wp.array(dtype=wp.int32),
@@ -134,13 +148,13 @@ def _make_gradient(weight: Weight, space: Space) -> wp.Kernel:
         out: wp.array(dtype=mat),
     ):
         k = first + wp.tid()
-        a = members[k] - offset
+        a = shore.members[k] - shore.offset
         if wet[k] == 1:
             total = mat()
-            for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
-                G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+            for i in wp.hash_grid_query(shore.solids, shore.own[k], real(reach) * reference.h[a]):
+                G = pair(shore.own[k], shore.at[i], reference.h[a], kappa[a] * shore.V[i])
                 if wp.length_sq(G) > real(0.0):
-                    total += wp.outer(v[places[i]] - v[members[k]], G)
+                    total += wp.outer(v[shore.places[i]] - v[shore.members[k]], G)
             out[a] = out[a] + total
 
     return add_gradient
@@ -149,19 +163,13 @@ def _make_gradient(weight: Weight, space: Space) -> wp.Kernel:
 @functools.cache
 def _make_force(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: on the liquid, V_a Q_a Σ_b G_ab; and what that gradient does to its store, f_ab·(v̄_b − v̄_a) Δt."""
-    vec, real, vec3, pair = space.vec, space.real, _grid_vector(space), _pair(weight, space)
+    vec, real, Shore, pair = space.vec, space.real, _shore_structure(space), _pair(weight, space)
     Reference, Flux, reach = structure(space, "Reference"), structure(space, "Flux"), weight.support * QUERY_MARGIN
 
     @wp.kernel(module="unique", enable_backward=False)
     def force_on_liquid(
         first: int,
-        solids: wp.uint64,
-        at: wp.array(dtype=vec3),
-        V: wp.array(dtype=real),
-        places: wp.array(dtype=wp.int32),
-        own: wp.array(dtype=vec3),
-        members: wp.array(dtype=wp.int32),
-        offset: int,
+        shore: Shore,
         reference: Reference,
         flux: Flux,
         kappa: wp.array(dtype=real),
@@ -172,18 +180,18 @@ def _make_force(weight: Weight, space: Space) -> wp.Kernel:
         out: wp.array(dtype=vec),
     ):
         k = first + wp.tid()
-        a = members[k] - offset
+        a = shore.members[k] - shore.offset
         power[k] = wp.float64(0.0)
         if wet[k] == 1:
             force = vec()
             rate = real(0.0)
-            for i in wp.hash_grid_query(solids, own[k], real(reach) * reference.h[a]):
-                G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+            for i in wp.hash_grid_query(shore.solids, shore.own[k], real(reach) * reference.h[a]):
+                G = pair(shore.own[k], shore.at[i], reference.h[a], kappa[a] * shore.V[i])
                 if wp.length_sq(G) > real(0.0):
                     f = (flux.Q[a] @ G) * reference.V[a]
                     force += f
-                    rate += wp.dot(f, v[places[i]] - v[members[k]])
-            out[members[k]] = out[members[k]] + force
+                    rate += wp.dot(f, v[shore.places[i]] - v[shore.members[k]])
+            out[shore.members[k]] = out[shore.members[k]] + force
             power[k] = dt[0] * wp.float64(rate)
 
     return force_on_liquid
@@ -192,21 +200,14 @@ def _make_force(weight: Weight, space: Space) -> wp.Kernel:
 @functools.cache
 def _make_reaction(weight: Weight, space: Space) -> wp.Kernel:
     """Kernel: the opposite on the solids."""
-    vec, real, vec3, pair = space.vec, space.real, _grid_vector(space), _pair(weight, space)
+    vec, real, Shore, pair = space.vec, space.real, _shore_structure(space), _pair(weight, space)
     support = float(weight.support) * QUERY_MARGIN
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
 
     @wp.kernel(module="unique", enable_backward=False)
     def force_on_solid(
         first: int,
-        liquid: wp.uint64,
-        longest: wp.array(dtype=real),
-        at: wp.array(dtype=vec3),
-        V: wp.array(dtype=real),
-        places: wp.array(dtype=wp.int32),
-        own: wp.array(dtype=vec3),
-        members: wp.array(dtype=wp.int32),
-        offset: int,
+        shore: Shore,
         reference: Reference,
         flux: Flux,
         kappa: wp.array(dtype=real),
@@ -214,12 +215,12 @@ def _make_reaction(weight: Weight, space: Space) -> wp.Kernel:
     ):
         i = first + wp.tid()
         force = vec()
-        for k in wp.hash_grid_query(liquid, at[i], real(support) * longest[0]):
-            a = members[k] - offset
-            G = pair(own[k], at[i], reference.h[a], kappa[a] * V[i])
+        for k in wp.hash_grid_query(shore.liquid, shore.at[i], real(support) * shore.longest[0]):
+            a = shore.members[k] - shore.offset
+            G = pair(shore.own[k], shore.at[i], reference.h[a], kappa[a] * shore.V[i])
             if wp.length_sq(G) > real(0.0):
                 force -= (flux.Q[a] @ G) * reference.V[a]
-        out[places[i]] = out[places[i]] + force
+        out[shore.places[i]] = out[shore.places[i]] + force
 
     return force_on_solid
 
@@ -230,21 +231,14 @@ def _make_ask(weight: Weight, space: Space) -> wp.Kernel:
 
     It bounds the squares of frequencies at which solids move alone against what the liquid stores.
     """
-    real, vec3, pair = space.real, _grid_vector(space), _pair(weight, space)
+    real, Shore, pair = space.real, _shore_structure(space), _pair(weight, space)
     support = float(weight.support) * QUERY_MARGIN
     Reference, Flux, raise_largest = structure(space, "Reference"), structure(space, "Flux"), raise_to(space.real)
 
     @wp.kernel(module="unique", enable_backward=False)
     def ask(
         first: int,
-        liquid: wp.uint64,
-        longest: wp.array(dtype=real),
-        at: wp.array(dtype=vec3),
-        V: wp.array(dtype=real),
-        places: wp.array(dtype=wp.int32),
-        own: wp.array(dtype=vec3),
-        members: wp.array(dtype=wp.int32),
-        offset: int,
+        shore: Shore,
         reference: Reference,
         flux: Flux,
         kappa: wp.array(dtype=real),
@@ -254,14 +248,14 @@ def _make_ask(weight: Weight, space: Space) -> wp.Kernel:
     ):
         i = first + wp.tid()
         square = real(0.0)
-        for k in wp.hash_grid_query(liquid, at[i], real(support) * longest[0]):
-            a = members[k] - offset
-            size = wp.length(pair(own[k], at[i], reference.h[a], kappa[a] * V[i]))
+        for k in wp.hash_grid_query(shore.liquid, shore.at[i], real(support) * shore.longest[0]):
+            a = shore.members[k] - shore.offset
+            size = wp.length(pair(shore.own[k], shore.at[i], reference.h[a], kappa[a] * shore.V[i]))
             if size > real(0.0):
                 impedance = flux.impedance[a] * reference.V[a]
-                square += impedance * impedance / mass[members[k]] * size * met[k]
+                square += impedance * impedance / mass[shore.members[k]] * size * met[k]
         if square > real(0.0):
-            raise_largest(largest, square / mass[places[i]])
+            raise_largest(largest, square / mass[shore.places[i]])
 
     return ask
 
@@ -293,48 +287,44 @@ class WettingOfSolids:
         self.world, self.medium, self.space = world, medium, world.space
         device, space, n, m = world.device, world.space, medium.n, len(numbers)
         self._launch, self._weight = Launcher(device), medium.configuration.weight
-        self._places = assembly.order.places_of(numbers)
-        span = np.arange(medium.span.start, medium.span.stop, dtype=np.int32)
-        self._members = assembly.order.places_of(span)
-        V0 = assembly.order.by_number(world.particles.V0.numpy())[numbers]
-        self._V = wp.array(V0, dtype=space.real, device=device)
-        self._at, self._own = (wp.zeros(k, dtype=_grid_vector(space), device=device) for k in (m, n))
-        self._wet = wp.zeros(n, dtype=wp.int32, device=device)
-        self._met, self._largest, self._longest = (wp.zeros(k, dtype=space.real, device=device) for k in (n, 1, 1))
         sides = [64 if axis < space.dim else 1 for axis in range(3)]
         self._solids, self._liquid = (wp.HashGrid(*sides, device=device, dtype=space.real) for _ in range(2))
+        self._shore = shore = _shore_structure(space)()
+        shore.solids, shore.liquid, shore.offset = self._solids.id, self._liquid.id, medium.span.start
+        shore.places = assembly.order.places_of(numbers)
+        shore.members = assembly.order.places_of(np.arange(medium.span.start, medium.span.stop, dtype=np.int32))
+        V0 = assembly.order.by_number(world.particles.V0.numpy())[numbers]
+        shore.V = wp.array(V0, dtype=space.real, device=device)
+        shore.at, shore.own = (wp.zeros(k, dtype=_grid_vector(space), device=device) for k in (m, n))
+        self._wet = wp.zeros(n, dtype=wp.int32, device=device)
+        self._met, self._largest, shore.longest = (wp.zeros(k, dtype=space.real, device=device) for k in (n, 1, 1))
         self._reach = float(self._weight.support) * float(medium.particles.h.numpy().max()) * QUERY_MARGIN
         self._power, self._add = wp.zeros(n, dtype=wp.float64, device=device), Sum(wp.float64, n, device)
         self._nothing = wp.zeros(world.n, dtype=space.vec, device=device)
         self._step = wp.zeros(1, dtype=wp.float64, device=device)
 
     def _note(self) -> None:
-        x = self.world.U.x
-        self._launch(_make_note(self.space), len(self._places), [self._places, x, self._at])
-        self._launch(_make_note(self.space), len(self._own), [self._members, x, self._own])
+        x, shore = self.world.U.x, self._shore
+        self._launch(_make_note(self.space), len(shore.at), [shore.places, x, shore.at])
+        self._launch(_make_note(self.space), len(shore.own), [shore.members, x, shore.own])
         self.rebuild()
 
     def rebuild(self) -> None:
         """The grids of where all were, and the largest smoothing length of the liquid."""
-        self._solids.build(self._at, self._reach)
-        self._liquid.build(self._own, self._reach)
-        self._longest.zero_()
-        self._launch(make_longest(self.space), len(self._own), [self.medium.configuration.fields.h, self._longest])
+        shore, h = self._shore, self.medium.configuration.fields.h
+        self._solids.build(shore.at, self._reach)
+        self._liquid.build(shore.own, self._reach)
+        shore.longest.zero_()
+        self._launch(make_longest(self.space), len(h), [h, shore.longest])
 
     def renew(self) -> None:
         """Where all are in the present reference, which of the liquid is wet, and L of it."""
         self._note()
-        reference, kappa = self.medium.configuration.fields, self.medium.stabiliser.kappa
-        arguments = [self._solids.id, self._at, self._V, *self._liquid_members()]
-        arguments += [reference, kappa, self._wet, self._met]
+        arguments = [*self._of(), self.medium.stabiliser.kappa, self._wet, self._met]
         self._launch(_make_meet(self._weight, self.space), len(self._wet), arguments)
 
-    def _liquid_members(self) -> list[Any]:
-        return [self._own, self._members, self.medium.span.start]
-
     def _of(self) -> list[Any]:
-        liquid, reference = self._liquid_members(), self.medium.configuration.fields
-        return [self._solids.id, self._at, self._V, self._places, *liquid, reference]
+        return [self._shore, self.medium.configuration.fields]
 
     def add_gradient(self, v: wp.array, out: wp.array) -> None:
         """Add what solids add to ∇_k v (M28)."""
@@ -344,20 +334,17 @@ class WettingOfSolids:
         self._launch(_make_gradient(self._weight, self.space), len(self._wet), arguments)
 
     def _of_solids(self) -> list[Any]:
-        medium = self.medium
-        found = [self._liquid.id, self._longest, self._at, self._V, self._places]
-        found += [*self._liquid_members(), medium.configuration.fields, medium.flux.fields, medium.stabiliser.kappa]
-        return found
+        return [*self._of(), self.medium.flux.fields, self.medium.stabiliser.kappa]
 
     def press(self, out: wp.array) -> None:
         """Add forces [N] on all particles to ``out``, (n,) of vec."""
         self._press_liquid(out)
-        self._launch(_make_reaction(self._weight, self.space), len(self._places), [*self._of_solids(), out])
+        self._launch(_make_reaction(self._weight, self.space), len(self._shore.at), [*self._of_solids(), out])
 
     def rate(self) -> None:
         """Ask for steps in which solids that are lighter than the liquid are stable."""
         arguments = [*self._of_solids(), self._met, self.world.particles.mass, self._largest]
-        self._launch(_make_ask(self._weight, self.space), len(self._places), arguments)
+        self._launch(_make_ask(self._weight, self.space), len(self._shore.at), arguments)
         self._launch.once(_make_add(self.space), 1, [self._largest, self.world.clock.fields])
 
     def _press_liquid(self, out: wp.array) -> None:
@@ -374,7 +361,7 @@ class WettingOfSolids:
 
     def evolving(self) -> dict[str, wp.array]:
         """Where all were in the present reference, which of the liquid is wet, and how much of solids it has met."""
-        return {"at": self._at, "own": self._own, "wet": self._wet, "met": self._met}
+        return {"at": self._shore.at, "own": self._shore.own, "wet": self._wet, "met": self._met}
 
 
 def find_wettings(world: "World", assembly: Assembly, felt: np.ndarray) -> list[WettingOfSolids]:

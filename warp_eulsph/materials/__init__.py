@@ -1,5 +1,6 @@
 """Materials, one law per file."""
 
+from ..options import explain_mistakes
 from .bar import Bar
 from .base import Law, Material, Variable
 from .damage import Failure, JohnsonCookFailure, PlasticStrain, PrincipalStrain, PrincipalStress
@@ -52,3 +53,5 @@ __all__ = [
     "Viscosity",
     "Voce",
 ]
+
+explain_mistakes(__all__, globals())

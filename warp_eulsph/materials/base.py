@@ -42,16 +42,17 @@ class Variable(NamedTuple):
 
 
 class Eights(NamedTuple):
-    """A law for ``count`` particles, eight or fewer, at once: on the CPU, where that is faster.
+    """A law for a block of eight particles or fewer at once: on the CPU, where that is faster.
 
-    Functions, ``wp.func``, of (F, history, first, own, count, …), arrays with the particles' F from ``first`` and their
-    histories from ``own`` on; equal to those of the law up to round-off.
+    Functions, ``wp.func``, of (block, …), the struct of ``block_structure`` in ``in_eights.py``; equal to those of the
+    law up to round-off.
 
     Attributes:
-        stress: (…, Δt, constants, P): P from ``first`` on.
-        energy: (…, constants, Ψ): Ψ [J/m^d] from ``first`` on, in float64.
+        stress: (…, Δt, constants, P): P from ``block.first`` on.
+        energy: (…, constants, Ψ): Ψ [J/m^d] from ``block.first`` on, in float64.
         wave_moduli: (…, constants) -> (2, 8): M and μ of each.
-        update: (…, Δt, constants, lost): histories, and the energy dissipated per initial volume from ``first`` on.
+        update: (…, Δt, constants, lost): histories, and the energy dissipated per initial volume from ``block.first``
+            on.
     """
 
     stress: wp.Function
@@ -238,9 +239,16 @@ class Material(ABC):
         """Point functions in this space, cached: the same objects for the same space."""
 
     def filled_constants(self, law: Law) -> Any:
-        """``Law.Constants`` of this law with the values of ``constants``."""
-        filled = law.Constants()
-        for name, value in self.constants().items():
+        """``Law.Constants`` of this law with the values of ``constants``.
+
+        Raises:
+            ValueError: others than the fields of it.
+        """
+        filled, values, fields = law.Constants(), self.constants(), sorted(law.Constants.vars)
+        if not isinstance(values, dict) or sorted(values) != fields:
+            who = f"{type(self).__name__}.constants()"
+            raise ValueError(f"{who} must be a dict of {fields}, the fields of Law.Constants, got {values}")
+        for name, value in values.items():
             setattr(filled, name, value)
         return filled
 

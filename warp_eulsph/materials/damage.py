@@ -36,33 +36,58 @@ class Failure(ABC):
     @staticmethod
     @abstractmethod
     def make_growth(space: Space, law: Law, Constants: type) -> wp.Function:
-        """``wp.func`` (F, σ, mean, before, after, Δt, stored, spent, width, drive, D, constants) -> (drive, D).
+        """``wp.func`` (step, constants) -> (drive, D) after it; ``step`` is the struct of ``step_structure``.
 
-        ``law`` is that of the whole matter. F and its Cauchy stress σ are those after the step, (dim, dim), ``mean`` a
-        third of the trace of σ in 3-D; ``before`` and ``after`` are its rows of history, ``stored`` its energy and
-        ``spent`` what it dissipated in the step, per initial volume; ``width`` [m] that of a crack. ``drive`` is the
-        criterion's own memory, 0 at the start, 1 at the onset of damage.
+        ``law`` is that of the whole matter.
         """
 
 
 @functools.cache
-def softening(space: Space) -> wp.Function:
-    """``wp.func`` (r, r_max, D, stored, width, energy) -> (r_max, D): stress falls to zero along a line.
+def step_structure(space: Space, law: Law) -> Any:
+    """A step of a particle, as a criterion sees it.
+
+    ``F`` and its Cauchy stress ``sigma`` [Pa] are those of the whole matter after the step, (dim, dim), ``mean`` [Pa] a
+    third of the trace of σ in 3-D; ``before`` and ``after`` are its rows of history, ``stored`` [J/m^d] its energy and
+    ``spent`` what it dissipated in the step ``dt`` [s], per initial volume; ``width`` [m] that of a crack. ``drive`` is
+    the criterion's own memory, 0 at the start, 1 at the onset of damage ``D``, both as before the step.
+    """
+    real, mat, row = space.real, space.mat, history_row(space, law)
+
+    @wp.struct
+    class Step:
+        F: mat
+        sigma: mat
+        mean: real
+        before: row
+        after: row
+        dt: real
+        stored: real
+        spent: real
+        width: real
+        drive: real
+        D: real
+
+    return Step
+
+
+@functools.cache
+def softening(space: Space, law: Law) -> wp.Function:
+    """``wp.func`` (r, step, energy) -> (r_max, D): stress falls to zero along a line; r_max is the drive.
 
     r is σ or ε over its strength. Beyond 1 D = r_u/(r_u − 1) (1 − 1/r); ∫ Ψ dD = G/width with r_u = G r²/(width Ψ),
     where Ψ grows with r². A width too large for that, r_u ≤ 1, breaks at once.
     """
-    real, pair = space.real, space.row(2)
+    real, pair, Step = space.real, space.row(2), step_structure(space, law)
 
     @wp.func
-    def softening(r: real, most: real, D: real, stored: real, width: real, energy: real) -> pair:
-        if r <= wp.max(most, real(1.0)):
-            return pair(most, D)
-        ultimate = energy * r * r / (width * stored)
+    def softening(r: real, s: Step, energy: real) -> pair:
+        if r <= wp.max(s.drive, real(1.0)):
+            return pair(s.drive, s.D)
+        ultimate = energy * r * r / (s.width * s.stored)
         grown = real(1.0)
         if ultimate > r:
             grown = ultimate / (ultimate - real(1.0)) * (real(1.0) - real(1.0) / r)
-        return pair(r, wp.max(D, grown))
+        return pair(r, wp.max(s.D, grown))
 
     return softening
 
@@ -91,25 +116,12 @@ class PrincipalStress(Failure):
     @staticmethod
     @functools.cache
     def make_growth(space: Space, law: Law, Constants: type) -> wp.Function:
-        real, mat, pair, row = space.real, space.mat, space.row(2), history_row(space, law)
-        bounds, soften = symmetric_bounds(space), softening(space)
+        pair, Step = space.row(2), step_structure(space, law)
+        bounds, soften = symmetric_bounds(space), softening(space, law)
 
         @wp.func
-        def growth(
-            F: mat,
-            sigma: mat,
-            mean: real,
-            before: row,
-            after: row,
-            dt: real,
-            stored: real,
-            spent: real,
-            width: real,
-            drive: real,
-            D: real,
-            c: Constants,
-        ) -> pair:
-            return soften(bounds(sigma)[1] / c.strength, drive, D, stored, width, c.energy)
+        def growth(s: Step, c: Constants) -> pair:
+            return soften(bounds(s.sigma)[1] / c.strength, s, c.energy)
 
         return growth
 
@@ -138,44 +150,33 @@ class PrincipalStrain(Failure):
     @staticmethod
     @functools.cache
     def make_growth(space: Space, law: Law, Constants: type) -> wp.Function:
-        real, mat, pair, row = space.real, space.mat, space.row(2), history_row(space, law)
-        bounds, soften = symmetric_bounds(space), softening(space)
+        real, pair, Step = space.real, space.row(2), step_structure(space, law)
+        bounds, soften = symmetric_bounds(space), softening(space, law)
 
         @wp.func
-        def growth(
-            F: mat,
-            sigma: mat,
-            mean: real,
-            before: row,
-            after: row,
-            dt: real,
-            stored: real,
-            spent: real,
-            width: real,
-            drive: real,
-            D: real,
-            c: Constants,
-        ) -> pair:
-            largest = real(0.5) * wp.log(bounds(F @ wp.transpose(F))[1])
-            return soften(largest / c.strain, drive, D, stored, width, c.energy)
+        def growth(s: Step, c: Constants) -> pair:
+            largest = real(0.5) * wp.log(bounds(s.F @ wp.transpose(s.F))[1])
+            return soften(largest / c.strain, s, c.energy)
 
         return growth
 
 
 @functools.cache
-def _wearing(real: type, pair: Any) -> wp.Function:
-    """``wp.func`` (share, drive, D, spent, width, energy) -> (drive, D) of a step with ``share`` of what is borne.
+def _wearing(space: Space, law: Law) -> wp.Function:
+    """``wp.func`` (share, step, energy) -> (drive, D) of a step with ``share`` of what is borne.
 
     Beyond the onset dD = width/(2 G) times the plastic work of whole matter, of which 1 − D is done: in sum G/width.
     """
 
+    real, pair, Step = space.real, space.row(2), step_structure(space, law)
+
     @wp.func
-    def wearing(share: real, drive: real, D: real, spent: real, width: real, energy: real) -> pair:
+    def wearing(share: real, s: Step, energy: real) -> pair:
         if share <= real(0.0):
-            return pair(drive, D)
-        beyond = wp.clamp((drive + share - real(1.0)) / share, real(0.0), real(1.0))
-        grown = D + beyond * spent * width / (real(2.0) * energy)
-        return pair(drive + share, wp.min(grown, real(1.0)))
+            return pair(s.drive, s.D)
+        beyond = wp.clamp((s.drive + share - real(1.0)) / share, real(0.0), real(1.0))
+        grown = s.D + beyond * s.spent * s.width / (real(2.0) * energy)
+        return pair(s.drive + share, wp.min(grown, real(1.0)))
 
     return wearing
 
@@ -202,26 +203,12 @@ class PlasticStrain(Failure):
     @staticmethod
     @functools.cache
     def make_growth(space: Space, law: Law, Constants: type) -> wp.Function:
-        real, mat, pair, row = space.real, space.mat, space.row(2), history_row(space, law)
-        alpha, wearing = law.columns("plastic_strain").start, _wearing(space.real, pair)
+        pair, Step = space.row(2), step_structure(space, law)
+        alpha, wearing = law.columns("plastic_strain").start, _wearing(space, law)
 
         @wp.func
-        def growth(
-            F: mat,
-            sigma: mat,
-            mean: real,
-            before: row,
-            after: row,
-            dt: real,
-            stored: real,
-            spent: real,
-            width: real,
-            drive: real,
-            D: real,
-            c: Constants,
-        ) -> pair:
-            share = (after[alpha] - before[alpha]) / c.strain
-            return wearing(share, drive, D, spent, width, c.energy)
+        def growth(s: Step, c: Constants) -> pair:
+            return wearing((s.after[alpha] - s.before[alpha]) / c.strain, s, c.energy)
 
         return growth
 
@@ -273,8 +260,8 @@ class JohnsonCookFailure(Failure):
     @staticmethod
     @functools.cache
     def make_growth(space: Space, law: Law, Constants: type) -> wp.Function:
-        real, mat, pair, row, dim = space.real, space.mat, space.row(2), history_row(space, law), space.dim
-        alpha, wearing = law.columns("plastic_strain").start, _wearing(space.real, pair)
+        real, mat, pair, dim, Step = space.real, space.mat, space.row(2), space.dim, step_structure(space, law)
+        alpha, wearing = law.columns("plastic_strain").start, _wearing(space, law)
         heats = any(variable.name == "temperature" for variable in law.history)
         heat = law.columns("temperature").start if heats else 0
 
@@ -288,29 +275,16 @@ class JohnsonCookFailure(Failure):
             return mean / wp.sqrt(wp.max(real(1.5) * square, real(1e-20) * mean * mean))
 
         @wp.func
-        def growth(
-            F: mat,
-            sigma: mat,
-            mean: real,
-            before: row,
-            after: row,
-            dt: real,
-            stored: real,
-            spent: real,
-            width: real,
-            drive: real,
-            D: real,
-            c: Constants,
-        ) -> pair:
-            flow = after[alpha] - before[alpha]
+        def growth(s: Step, c: Constants) -> pair:
+            flow = s.after[alpha] - s.before[alpha]
             if flow <= real(0.0):
-                return pair(drive, D)
-            star = wp.clamp(triaxiality(sigma, mean), real(-1.5), real(1.5))
+                return pair(s.drive, s.D)
+            star = wp.clamp(triaxiality(s.sigma, s.mean), real(-1.5), real(1.5))
             borne = c.D1 + c.D2 * wp.exp(c.D3 * star)
-            borne *= real(1.0) + c.D4 * wp.log(wp.max(flow / (dt * c.reference_rate), real(1.0)))
+            borne *= real(1.0) + c.D4 * wp.log(wp.max(flow / (s.dt * c.reference_rate), real(1.0)))
             if wp.static(heats):
-                hot = wp.clamp((after[heat] - c.temperature) / c.range, real(0.0), real(1.0))
+                hot = wp.clamp((s.after[heat] - c.temperature) / c.range, real(0.0), real(1.0))
                 borne *= real(1.0) + c.D5 * hot
-            return wearing(flow / borne, drive, D, spent, width, c.energy)
+            return wearing(flow / borne, s, c.energy)
 
         return growth

@@ -10,7 +10,7 @@ import warp as wp
 from ..linalg import det, inverse
 from ..space import Space
 from .base import Isotropic, Law, Material, Variable, history_row, lame_constants, long_form, positive
-from .damage import Failure
+from .damage import Failure, step_structure
 from .drucker_prager import DruckerPrager
 
 DAMAGE = Variable("damage", "-", "0 whole, 1 failed: no more tension and shear", least=0.0)
@@ -40,7 +40,7 @@ class Failing(Material):
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Isotropic):
-            raise TypeError(f"material must be a law with young and poisson, got {self.material!r}")
+            raise ValueError(f"material must be a law with young and poisson such as J2(...), got {self.material!r}")
         if self.material.linear:
             raise ValueError(f"{type(self.material).__name__} is for small turns; pieces of what breaks turn")
         if isinstance(self.material, DruckerPrager):
@@ -84,7 +84,7 @@ def _law(space: Space, whole: Law, failure: type[Failure], names: tuple[str, ...
     long, determinant, invert = long_form(space, whole), det(space), inverse(space)
     stress_of, energy_of, moduli_of, update_of = long.stress, long.energy, long.wave_moduli, whole.update
     secant_of, rebase_of = whole.secant, whole.rebase
-    growth = failure.make_growth(space, whole, Constants)
+    growth, Step = failure.make_growth(space, whole, Constants), step_structure(space, whole)
 
     @wp.func
     def own(h: row) -> part:
@@ -145,7 +145,7 @@ def _law(space: Space, whole: Law, failure: type[Failure], names: tuple[str, ...
         W, p = energy_of(F_new, after, c.whole), pressed(F_new, c)
         sigma = stress_of(F_new, rate, after, real(0.0), c.whole) @ wp.transpose(F_new) / J
         drive, width, mean = h[wp.static(size + 1)], h[wp.static(size + 2)], c.bulk * wp.log(J) / J
-        grown = growth(F_new, sigma, mean, before, after, dt, W, spent, width, drive, D, c)
+        grown = growth(Step(F_new, sigma, mean, before, after, dt, W, spent, width, drive, D), c)
         out = joined(after, h)
         out[wp.static(size)] = grown[1]
         out[wp.static(size + 1)] = grown[0]

@@ -28,14 +28,29 @@ from .log_strain import (
 EIGHT = 8
 
 
-class PlasticEights(NamedTuple):
-    """Functions, all ``wp.func``, of ``count`` particles, eight or fewer, whose C_p⁻¹ begins their rows of history.
+@functools.cache
+def block_structure(mat: type, row: type) -> Any:
+    """Eight particles of one kind of law, or the rest of them.
 
-    They take (F, history, first, own, count, …), arrays with the particles' F from ``first`` and their histories from
-    ``own`` on.
+    ``F`` has their F from ``first`` on, ``history`` their rows from ``own`` on, ``count`` of them.
+    """
+
+    @wp.struct
+    class Block:
+        F: wp.array(dtype=mat)
+        history: wp.array(dtype=row)
+        first: int
+        own: int
+        count: int
+
+    return Block
+
+
+class PlasticEights(NamedTuple):
+    """Functions, all ``wp.func``, of a block (``block_structure``) whose C_p⁻¹ begins its rows of history.
 
     Attributes:
-        measure: -> (2, 8): |dev e|, NaN where the single particle's functions must be taken, and ln J.
+        measure: block -> (2, 8): |dev e|, NaN where the single particle's functions must be taken, and ln J.
         stress: (…, t, s, P): P from ``first`` on ← (t + s dev e) F⁻ᵀ, t and s of each.
         flow: (…, share): C_p⁻¹ that leaves this share of dev e; where it is 1, nothing is written.
     """
@@ -71,12 +86,14 @@ def _logarithm(real: type) -> str:
 def plastic_eights(space: Space, row: Any) -> PlasticEights:
     """The functions for rows of history of this type."""
     real, mat = space.real, space.mat
-    eight, two_eights = space.row(EIGHT), matrix_type(2, EIGHT, real)
+    eight, two_eights, Block = space.row(EIGHT), matrix_type(2, EIGHT, real), block_structure(mat, row)
     begin = f"""
     #pragma clang fp contract(fast)
     typedef {"double" if real is wp.float64 else "float"} T;
     typedef T E __attribute__((ext_vector_type({EIGHT})));
     constexpr int dim = {space.dim};
+    const int first = block.first, own = block.own, count = block.count;
+    auto& history = block.history;
     // has the stack frame aligned, as in simd.py
     alignas(64) volatile char aligned[64];
     aligned[0] = 0;
@@ -89,7 +106,7 @@ def plastic_eights(space: Space, row: Any) -> PlasticEights:
         for (int j = 0; j < 3; ++j)
             if (i < dim && j < dim)
                 #pragma unroll
-                for (int k = 0; k < {EIGHT}; ++k) G[i][j][k] = F.data[first + of[k]].data[i][j];
+                for (int k = 0; k < {EIGHT}; ++k) G[i][j][k] = block.F.data[first + of[k]].data[i][j];
             else G[i][j] = T(i == j);
     #pragma unroll
     for (int i = 0; i < 6; ++i)
@@ -127,9 +144,7 @@ def plastic_eights(space: Space, row: Any) -> PlasticEights:
     __builtin_memcpy(out.data[1], &ln_J, sizeof(E));
     return out;
     """)
-    def measure(
-        F: wp.array(dtype=mat), history: wp.array(dtype=row), first: int, own: int, count: int
-    ) -> two_eights: ...
+    def measure(block: Block) -> two_eights: ...
 
     @wp.func_native(f"""
     {begin}
@@ -160,16 +175,7 @@ def plastic_eights(space: Space, row: Any) -> PlasticEights:
             for (int k = 0; k < count; ++k) P.data[first + k].data[i][j] = sum[k];
         }}
     """)
-    def stress(
-        F: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        first: int,
-        own: int,
-        count: int,
-        tension: eight,
-        shear: eight,
-        P: wp.array(dtype=mat),
-    ): ...
+    def stress(block: Block, tension: eight, shear: eight, P: wp.array(dtype=mat)): ...
 
     # of (1 - w)^z, z in [0, 1/3], w = c2 + c3: |terms| below w^n/3n
     w_most = largest_c2(SELDOM_PASSED) + 2.0 * SELDOM_PASSED**3
@@ -208,6 +214,6 @@ def plastic_eights(space: Space, row: Any) -> PlasticEights:
         if (left[k] < 1)
             for (int i = 0; i < 6; ++i) history.data[own + k].c[i] = out[i][k];
     """)
-    def flow(F: wp.array(dtype=mat), history: wp.array(dtype=row), first: int, own: int, count: int, share: eight): ...
+    def flow(block: Block, share: eight): ...
 
     return PlasticEights(measure, stress, flow)

@@ -11,7 +11,7 @@ from ..linalg import cofactor, det
 from ..space import Space, matrix_type
 from .base import Eights, Isotropic, Law, Variable, history_row, lame_constants
 from .hardening import Hardening
-from .in_eights import EIGHT, plastic_eights
+from .in_eights import EIGHT, block_structure, plastic_eights
 from .plastic_metric import METRIC, elastic_kinematics, moduli_of_size
 
 STRAIN = Variable("plastic_strain", "-", "equivalent plastic strain", least=0.0)
@@ -184,90 +184,63 @@ def _law(space: Space, hardening: type[Hardening], sizes: tuple[tuple[str, int],
 def _in_eights(space: Space, law: Law, flow: wp.Function, flown: wp.Function, stored: wp.Function) -> Eights:
     """The law's stress, energy and update for eight particles at once."""
     real, mat, row, Constants = space.real, space.mat, history_row(space, law), law.Constants
-    eight, (measure, stress_of, flow_of) = space.row(EIGHT), plastic_eights(space, row)
+    eight, Block = space.row(EIGHT), block_structure(mat, row)
+    measure, stress_of, flow_of = plastic_eights(space, row)
     pair, two_eights, of_size = space.row(2), matrix_type(2, EIGHT, real), moduli_of_size(real)
     one_stress, one_energy, one_update, moduli_of = law.stress, law.energy, law.update, law.wave_moduli
 
     @wp.func
-    def stress(
-        F: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        first: int,
-        own: int,
-        count: int,
-        dt: real,
-        c: Constants,
-        P: wp.array(dtype=mat),
-    ):
-        size, t, s = measure(F, history, first, own, count), eight(), eight()
-        for k in range(count):
+    def stress(block: Block, dt: real, c: Constants, P: wp.array(dtype=mat)):
+        size, t, s = measure(block), eight(), eight()
+        for k in range(block.count):
             t[k] = c.kappa * size[1, k]
             if size[0, k] == size[0, k]:
-                s[k] = real(2.0) * c.mu * flow(size[0, k], history[own + k], dt, c)[1]
-        stress_of(F, history, first, own, count, t, s, P)
-        for k in range(count):
+                s[k] = real(2.0) * c.mu * flow(size[0, k], block.history[block.own + k], dt, c)[1]
+        stress_of(block, t, s, P)
+        for k in range(block.count):
             if size[0, k] != size[0, k]:
-                P[first + k] = one_stress(F[first + k], mat(), history[own + k], dt, c)
+                P[block.first + k] = one_stress(block.F[block.first + k], mat(), block.history[block.own + k], dt, c)
 
     @wp.func
-    def energy(
-        F: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        first: int,
-        own: int,
-        count: int,
-        c: Constants,
-        out: wp.array(dtype=wp.float64),
-    ):
-        size = measure(F, history, first, own, count)
-        for k in range(count):
+    def energy(block: Block, c: Constants, out: wp.array(dtype=wp.float64)):
+        size = measure(block)
+        for k in range(block.count):
             if size[0, k] == size[0, k]:
-                out[first + k] = wp.float64(stored(size[0, k], size[1, k], c))
+                out[block.first + k] = wp.float64(stored(size[0, k], size[1, k], c))
             else:
-                out[first + k] = wp.float64(one_energy(F[first + k], history[own + k], c))
+                out[block.first + k] = wp.float64(one_energy(block.F[block.first + k], block.history[block.own + k], c))
 
     @wp.func
-    def wave_moduli(
-        F: wp.array(dtype=mat), history: wp.array(dtype=row), first: int, own: int, count: int, c: Constants
-    ) -> two_eights:
-        size, out = measure(F, history, first, own, count), two_eights()
-        for k in range(count):
+    def wave_moduli(block: Block, c: Constants) -> two_eights:
+        size, out = measure(block), two_eights()
+        for k in range(block.count):
             M = pair()
             if wp.static(space.dim == 3) and size[0, k] == size[0, k]:
                 M = of_size(size[0, k], c.kappa * size[1, k], c.mu, c.kappa)
             else:
-                M = moduli_of(F[first + k], history[own + k], c)
+                M = moduli_of(block.F[block.first + k], block.history[block.own + k], c)
             out[0, k] = M[0]
             out[1, k] = M[1]
         return out
 
     @wp.func
-    def update(
-        F: wp.array(dtype=mat),
-        history: wp.array(dtype=row),
-        first: int,
-        own: int,
-        count: int,
-        dt: real,
-        c: Constants,
-        lost: wp.array(dtype=real),
-    ):
-        size, left = measure(F, history, first, own, count), eight()
+    def update(block: Block, dt: real, c: Constants, lost: wp.array(dtype=real)):
+        size, left = measure(block), eight()
         any_flows = bool(False)
-        for k in range(count):
+        for k in range(block.count):
             left[k] = real(1.0)
             if size[0, k] == size[0, k]:
-                h, share, work = flown(size[0, k], history[own + k], dt, c)
+                h, share, work = flown(size[0, k], block.history[block.own + k], dt, c)
                 left[k] = share
                 if share < real(1.0):
                     any_flows = True
-                history[own + k] = h
-                lost[first + k] = work
+                block.history[block.own + k] = h
+                lost[block.first + k] = work
             else:
-                _F, h_k, work_k = one_update(F[first + k], mat(), history[own + k], dt, c)
-                history[own + k] = h_k
-                lost[first + k] = work_k
+                _F, h_k, work_k = one_update(block.F[block.first + k], mat(), block.history[block.own + k], dt, c)
+                block.history[block.own + k] = h_k
+                lost[block.first + k] = work_k
         if any_flows:
-            flow_of(F, history, first, own, count, left)
+            flow_of(block, left)
 
     return Eights(stress, energy, wave_moduli, update)

@@ -19,9 +19,12 @@ VECTORS = 2
 
 
 @functools.cache
-def make_pair_sums(weight: Weight, space: Space) -> wp.Kernel:
-    """Kernel: w_ab = V_b g_ab of every pair, its sum, K_a = Σ w ξ⊗ξ (M3, ξ = x_b − x_a) and the mass sum of M7."""
-    real, mat = space.real, space.mat
+def make_pair_sums(weight: Weight, space: Space, of_v: bool) -> wp.Kernel:
+    """Kernel: w_ab = V_b g_ab of every pair, its sum, K_a = Σ w ξ⊗ξ (M3, ξ = x_b − x_a) and the mass sum of M7.
+
+    With ``of_v`` the sums of ∇v instead of masses, Σ w (v_b − v_a)⊗ξ: what M4 multiplies by L.
+    """
+    real, vec, mat = space.real, space.vec, space.mat
     Particles, Reference, Neighbours = (
         structure(space, "Particles"),
         structure(space, "Reference"),
@@ -30,11 +33,19 @@ def make_pair_sums(weight: Weight, space: Space) -> wp.Kernel:
     separation, g_of = difference(space), pair_weight(weight, space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def pair_sums(first: int, particles: Particles, reference: Reference, near: Neighbours, K: wp.array(dtype=mat)):
+    def pair_sums(
+        first: int,
+        particles: Particles,
+        reference: Reference,
+        near: Neighbours,
+        v: wp.array(dtype=vec),
+        K: wp.array(dtype=mat),
+        out: wp.array(dtype=mat),
+    ):
         a = first + wp.tid()
         x_a = reference.x[a]
         h_a = reference.h[a]
-        K_a = mat()
+        K_a, changes = mat(), mat()
         row = real(0.0)
         diagonal = real(0.0)
         for k in range(near.start[a], near.stop[a], near.stride):
@@ -44,10 +55,16 @@ def make_pair_sums(weight: Weight, space: Space) -> wp.Kernel:
             w = reference.V[b] * g
             near.w[k] = w
             K_a += wp.outer(xi, xi) * w
-            row += particles.mass[b] * g
             diagonal += w
+            if wp.static(of_v):
+                changes += wp.outer(v[b] - v[a], xi * w)
+            else:
+                row += particles.mass[b] * g
         K[a] = K_a
-        reference.row[a] = row
+        if wp.static(of_v):
+            out[a] = changes
+        else:
+            reference.row[a] = row
         reference.diagonal[a] = diagonal
 
     return pair_sums
@@ -78,10 +95,7 @@ def make_pack(space: Space, of_v: bool) -> wp.Kernel:
 
 @functools.cache
 def make_pair_sums_simd(weight: Weight, space: Space, of_v: bool) -> wp.Kernel:
-    """SIMD kernel of ``make_pair_sums``, from packed rows.
-
-    With ``of_v`` the sums of ∇v instead of masses, Σ w (v_b − v_a)⊗ξ: what M4 multiplies by L.
-    """
+    """SIMD kernel of ``make_pair_sums``, from packed rows."""
     real, vec, mat = space.real, space.vec, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     sigma = weight.sigma[space.dim - 1]

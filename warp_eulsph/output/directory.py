@@ -87,6 +87,13 @@ class RunDirectory:
         """Whether a run has begun here."""
         return self.description.is_file() or bool(numbered(self.snapshots, ".vtkhdf"))
 
+    @property
+    def without_a_run(self) -> str:
+        """That no run is here, and why, in words."""
+        if self.path.is_file():
+            return f"no run in {self.path}, which is a file: cases are run by warp-eulsph run, into directories"
+        return f"no run in {self.path}: run.json is not there"
+
     def check_own(self) -> None:
         """Refuse to begin a run where files of its names are somebody else's.
 
@@ -116,7 +123,12 @@ class RunDirectory:
         """
         from filelock import FileLock, Timeout
 
-        self.path.mkdir(parents=True, exist_ok=True)
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise type(error)(
+                f"a run must have a directory that can be made, got {self.path} ({error.strerror}); choose another"
+            ) from error
         lock = FileLock(self.path / "run.lock")
         try:
             lock.acquire(timeout=_LOOK)

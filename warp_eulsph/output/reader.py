@@ -203,7 +203,7 @@ class Run(Sequence[RunFrame]):
     def __init__(self, path: str | PathLike):
         self.directory = RunDirectory(path)
         if not self.directory.holds_a_run:
-            raise FileNotFoundError(f"no run in {self.directory.path}: neither run.json nor snapshots are there")
+            raise FileNotFoundError(self.directory.without_a_run)
         manifest = Manifest(self.directory.path)
         try:
             manifest.read()

@@ -9,7 +9,7 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..space import Space, difference
 from ..structs import StateArrays
-from .pair_forces import PairForces
+from .pair_forces import PairForces, make_pressure
 from .reference import Configuration
 from .sensor import Sensor
 from .stabiliser import Stabiliser, Sums
@@ -124,14 +124,18 @@ def upwind_between(space: Space, sensed: bool) -> wp.Function:
 
 
 @functools.cache
-def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
-    """Kernel: D_a of M9."""
-    real, vec, mat = space.real, space.vec, space.mat
+def _make_forces(space: Space, joined: bool, balanced: bool, sensed: bool, pressure: bool) -> wp.Kernel:
+    """Kernel, portable: M9; ``joined`` with M5, for both read the same of each pair, and with ``pressure`` ∇_k p (M4).
+
+    M5 takes ``balanced`` positions (M13) or those of the particles.
+    """
+    real, vec, mat, row, rows_of_p = space.real, space.vec, space.mat, space.row(1), space.row_gradient(1)
     Reference, Flux = structure(space, "Reference"), structure(space, "Flux")
     Neighbours, pair_force = neighbour_structure(space), upwind_between(space, sensed)
+    separation = difference(space)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def dissipate(
+    def pair_forces_portable(
         first: int,
         reference: Reference,
         near: Neighbours,
@@ -141,15 +145,33 @@ def make_dissipation(space: Space, sensed: bool) -> wp.Kernel:
         grad_v: wp.array(dtype=mat),
         epsilon: real,
         sensor: wp.array(dtype=vec),
-        out: wp.array(dtype=vec),
+        p: wp.array(dtype=row),
+        internal: wp.array(dtype=vec),
+        dissipation: wp.array(dtype=vec),
+        grad_p: wp.array(dtype=rows_of_p),
     ):
         a = first + wp.tid()
-        force = vec()
+        force, drag, slope = vec(), vec(), vec()
         for k in range(near.start[a], near.stop[a], near.stride):
-            force += pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
-        out[a] = force
+            b = near.index[k]
+            xi = separation(reference.x[b], reference.x[a], near.box)
+            drag += pair_force(a, k, reference, near, flux, x, v, grad_v, epsilon, sensor)
+            if wp.static(pressure):
+                slope += xi * near.w[k] * (p[b][0] - p[a][0])
+            if wp.static(balanced):
+                xi = separation(reference.balanced[b], reference.balanced[a], near.box)
+            if wp.static(joined):
+                force += (flux.Pi[a] + flux.Pi[b]) @ (xi * near.w[k])
+        dissipation[a] = drag
+        if wp.static(joined):
+            internal[a] = force * reference.V[a]
+        if wp.static(pressure):
+            sums = rows_of_p()
+            for i in range(wp.static(space.dim)):
+                sums[0, i] = slope[i]
+            grad_p[a] = sums @ reference.L[a]
 
-    return dissipate
+    return pair_forces_portable
 
 
 class UpwindForces(Stabiliser):
@@ -159,7 +181,9 @@ class UpwindForces(Stabiliser):
 
     def __init__(self, space: Space, device: wp.DeviceLike):
         self.space, self.device, self._launch = space, device, Launcher(device)
-        self._in_one_pass = PairForces(space, device)
+        self._by_simd = PairForces(space, device)
+        self._no_p = wp.zeros(0, dtype=space.row(1), device=device)
+        self._no_gradient = wp.zeros(0, dtype=space.row_gradient(1), device=device)
 
     def refresh(self, configuration: Configuration, state: StateArrays) -> None:
         """Nothing to prepare: M9 needs the lists only."""
@@ -169,17 +193,23 @@ class UpwindForces(Stabiliser):
         return not configuration.pairs_by_simd(sensed)
 
     def sums_pressure(self, configuration: Configuration, sensed: bool) -> bool:
-        """The SIMD pass can, along the pairs of M9."""
-        return not self.balances and not self.takes_dual(configuration, sensed)
+        """Where M9 comes with M5, and M4 joins the same positions."""
+        return not self.balances and configuration.simd == configuration.pairs_by_simd(sensed)
 
     def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
-        """Internal force (M5) and dissipation (M9)."""
-        configuration, forces, sensed = sums.configuration, sums.forces, sums.sensor is not None
+        """Internal force (M5) and dissipation (M9), and the gradient of p where it is asked for."""
+        configuration, flux, forces, sensed = sums.configuration, sums.flux, sums.forces, sums.sensor is not None
+        pressure = sums.grad_p is not None
+        if pressure:
+            self._launch(make_pressure(self.space), len(v), [flux, sums.p])
         if not self.takes_dual(configuration, sensed):
-            arguments = [configuration, sums.flux, x, v, sums.grad_v, sums.epsilon, forces, sums.grad_p]
-            self._in_one_pass.compute(*arguments)
+            self._by_simd.compute(configuration, flux, x, v, sums.grad_v, sums.epsilon, forces, sums.grad_p)
             return
-        configuration.divergence(sums.flux.Pi, forces.internal)
-        arguments = [configuration.fields, configuration.near, sums.flux, x, v, sums.grad_v, sums.epsilon]
-        arguments += [sums.sensor if sensed else v, forces.dissipation]
-        self._launch(make_dissipation(self.space, sensed), len(v), arguments)
+        joined = not configuration.simd
+        if not joined:  # with a sensor, of which the SIMD pass does not know
+            configuration.divergence(flux.Pi, forces.internal)
+        arguments = [configuration.fields, configuration.near, flux, x, v, sums.grad_v, sums.epsilon]
+        arguments += [sums.sensor if sensed else v, sums.p if pressure else self._no_p]
+        arguments += [forces.internal, forces.dissipation, sums.grad_p if pressure else self._no_gradient]
+        kernel = _make_forces(self.space, joined, joined and self.balances, sensed, pressure)
+        self._launch(kernel, len(v), arguments)

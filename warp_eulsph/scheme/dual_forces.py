@@ -7,16 +7,41 @@ import warp as wp
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..simd import BY_TWO_DUAL, packed_rows, prelude
-from ..space import Space
+from ..space import Space, difference
 from ..structs import StateArrays
 from .reference import Configuration
-from .sharpening import Sharpener, make_pack
+from .sharpening import Sharpener, make_pack, unpack_columns
 from .stabiliser import Stabiliser, Sums
 
 
 @functools.cache
-def _make_forces(space: Space, tilted: bool) -> wp.Kernel:
+def _make_portable(space: Space, tilted: bool) -> wp.Kernel:
     """Kernel: M5 from packed rows; with tilted weights their Σ own ξ is known (M17), without it is summed here."""
+    real, vec, separation, unpack = space.real, space.vec, difference(space), unpack_columns(space)
+    Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def dual_forces_portable(
+        first: int, reference: Reference, near: Neighbours, rows: wp.array2d(dtype=real), internal: wp.array(dtype=vec)
+    ):
+        a = first + wp.tid()
+        Pi_a, x_a = unpack(rows, a)
+        total = vec()
+        if wp.static(tilted):
+            total = Pi_a @ reference.moment[a]
+        for k in range(near.start[a], near.stop[a], near.stride):
+            Pi, x_b = unpack(rows, near.index[k])
+            if wp.static(not tilted):
+                Pi = Pi_a + Pi
+            total += Pi @ (separation(x_b, x_a, near.box) * (near.w[k] + (near.w[k] - near.own[k])))
+        internal[a] = total * reference.V[a]
+
+    return dual_forces_portable
+
+
+@functools.cache
+def _make_simd(space: Space, tilted: bool) -> wp.Kernel:
+    """The same by SIMD."""
     real, vec = space.real, space.vec
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     snippet = f"""
@@ -91,19 +116,17 @@ class DualForces(Stabiliser):
         """Nothing to prepare."""
 
     def takes_dual(self, configuration: Configuration, sensed: bool) -> bool:
-        """The portable kernel does, the SIMD pass makes its own."""
-        return not configuration.simd
+        """Packed rows have Π."""
+        return False
 
     def compute(self, sums: Sums, x: wp.array, v: wp.array) -> None:
         """Internal force (M5)."""
         configuration, flux, internal, rows = sums.configuration, sums.flux, sums.forces.internal, self._rows
         if self._sharpener is not None:
-            self._sharpener.stress(flux.Q, flux.Pi)
+            self._sharpener.stress(flux.Q)
             rows = self._sharpener.stress_rows
-        elif configuration.simd:
+        else:
             self._launch(make_pack(self.space), len(internal), [configuration.fields, flux.Q, rows])
-        if not configuration.simd:
-            configuration.divergence(flux.Pi, internal)
-            return
-        kernel = _make_forces(self.space, configuration.tilt is not None)
+        make = _make_simd if configuration.simd else _make_portable
+        kernel = make(self.space, configuration.tilt is not None)
         self._launch(kernel, len(internal), [configuration.fields, configuration.near, rows, internal])

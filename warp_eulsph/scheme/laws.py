@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import warp as wp
 
+from ..checks import instance
 from ..fields import part_of, structure
 from ..materials import Law, Material
 from ..materials.base import history_row
@@ -79,11 +80,17 @@ def kinds_of(
     """The kinds of (material, number of particles) in the order of the ``particles``."""
     kinds: list[Kind] = []
     first, number, spacing = 0, int(particles.body.numpy()[0]), particles.spacing.numpy()
-    for law, alike in groupby(bodies, lambda body: body[0].law(space)):
+    for law, alike in groupby(bodies, lambda body: _law_of(body[0], space)):
         kinds.append(_kind(space, law, list(alike), number, first, spacing[first:], device))
         first += kinds[-1].size
         number += len(kinds[-1].parts)
     return kinds
+
+
+def _law_of(material: Material, space: Space) -> Law:
+    example = "Law(Constants, stress, energy, wave_moduli)"
+    found: Law = instance(material.law(space), Law, f"what {type(material).__name__}.law(space) returns", example)
+    return found
 
 
 def _kind(

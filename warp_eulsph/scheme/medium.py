@@ -174,7 +174,7 @@ class Medium:
             self.flux.keep_dissipated()
             self.volumes = VolumeFlux(self.space, self.flux, self.particles, own, self.device)
             if self.stabiliser.sums_pressure(self.configuration, self.sums.sensor is not None):
-                self.sums = replace(self.sums, grad_p=self.volumes.grad_p)
+                self.sums = replace(self.sums, p=self.volumes.p, grad_p=self.volumes.grad_p)
 
     def of(self, state: StateArrays) -> StateArrays:
         """Its own particles of one of the world's states: a struct ``State`` of views."""
@@ -216,7 +216,7 @@ class Medium:
 
     def renew(self, state: StateArrays) -> None:
         """Neighbours and corrections of the new reference (M3), what the options add, ∇_k v where it is kept."""
-        early = self.steady and not self.stabiliser.balances and self.configuration.sums_with_weights
+        early = self.steady and not self.stabiliser.balances
         self.configuration.renew(self.of(state).v, self.kept if early else None)
         self.stabilise(state)
         if early:

@@ -43,6 +43,19 @@ def pressure_of(space: Space) -> wp.Function:
 
 
 @functools.cache
+def make_pressure(space: Space) -> wp.Kernel:
+    """Kernel: p of the stress in the reference."""
+    row, Flux, of_stress = space.row(1), structure(space, "Flux"), pressure_of(space)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def pressure(first: int, flux: Flux, out: wp.array(dtype=row)):
+        a = first + wp.tid()
+        out[a] = row(of_stress(flux.Q[a]))
+
+    return pressure
+
+
+@functools.cache
 def _make_pack(space: Space) -> wp.Kernel:
     """Kernel: what the pass reads of a neighbour, side by side; Π = Q Lᵀ (M5) is made here."""
     real, vec, mat, dim = space.real, space.vec, space.mat, space.dim

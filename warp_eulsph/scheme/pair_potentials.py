@@ -9,7 +9,7 @@ from ..execution import Launcher
 from ..fields import neighbour_structure, repeated, structure
 from ..linalg import inverse
 from ..simd import BY_EIGHT_LARGER, OWN_ROW, packed_rows, prelude
-from ..space import Space, difference
+from ..space import Space, difference, vector_type
 from ..structs import StateArrays
 from .dissipation import Upwind, blend, upwind
 from .flux import Flux
@@ -226,15 +226,24 @@ def _make_simd(space: Space, damped: bool, stressed: bool, dual: bool, yielding:
     return pair_potentials_simd
 
 
+def _of_rotation(space: Space, stressed: bool) -> type:
+    """Of D = ∇v F⁻¹, the gradient of v in the present configuration, the portable pass reads all, or its spin."""
+    return space.mat if stressed else vector_type(3, space.real)
+
+
 @functools.cache
-def _make_spatial(space: Space) -> wp.Kernel:
-    """Kernel: ∇v F⁻¹, the gradient of v in the present configuration."""
-    mat, invert = space.mat, inverse(space)
+def _make_spatial(space: Space, stressed: bool) -> wp.Kernel:
+    """Kernel: D, or its spin."""
+    mat, invert, spin_of, kept = space.mat, inverse(space), make_spin(space), _of_rotation(space, stressed)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def spatial(first: int, F: wp.array(dtype=mat), grad_v: wp.array(dtype=mat), out: wp.array(dtype=mat)):
+    def spatial(first: int, F: wp.array(dtype=mat), grad_v: wp.array(dtype=mat), out: wp.array(dtype=kept)):
         a = first + wp.tid()
-        out[a] = grad_v[a] @ invert(F[a])
+        D = grad_v[a] @ invert(F[a])
+        if wp.static(stressed):
+            out[a] = D
+        else:
+            out[a] = spin_of(D)
 
     return spatial
 
@@ -244,7 +253,8 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
     """Kernel of the pass; M9 where ``damped``, reconstructed only where v is smooth if ``sensed``.
 
     With a stress (``stressed``) the jump is reconstructed by D = ∇v F⁻¹ between the pair as it is now; without by ∇v in
-    the reference, and by the spin of D for what positions are off. Either way a rotation is not dragged.
+    the reference, and by the spin of D for what positions are off. Either way a rotation is not dragged. ``rotation``
+    holds D or its spin.
 
     Π is kept with ``dual``.
     """
@@ -252,7 +262,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
     Flux, Forces, Particles = structure(space, "Flux"), structure(space, "Forces"), structure(space, "Particles")
     separation, pair_force, mix, invert = difference(space), upwind(space), blend(space), inverse(space)
-    spin_of, turned = make_spin(space), make_turned(space)
+    turned, kept = make_turned(space), _of_rotation(space, stressed)
 
     @wp.kernel(module="unique", enable_backward=False)
     def pair_potentials(
@@ -263,7 +273,7 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
         F: wp.array(dtype=mat),
         v: wp.array(dtype=vec),
         grad_v: wp.array(dtype=mat),
-        D: wp.array(dtype=mat),
+        rotation: wp.array(dtype=kept),
         sensor: wp.array(dtype=vec),
         particles: Particles,
         moduli: wp.array(dtype=real),
@@ -289,10 +299,10 @@ def _make_portable(space: Space, damped: bool, stressed: bool, sensed: bool, dua
                 plain = v[b] - v[a]
                 jump = plain
                 if wp.static(stressed):
-                    jump -= (D[a] + D[b]) @ (now * real(0.5))
+                    jump -= (rotation[a] + rotation[b]) @ (now * real(0.5))
                 else:
                     jump -= (grad_v[a] + grad_v[b]) @ (xi * real(0.5))
-                    jump -= turned(spin_of(D[a] + D[b]) * real(0.5), off, wp.length(xi))
+                    jump -= turned((rotation[a] + rotation[b]) * real(0.5), off, wp.length(xi))
                 jump = jump * epsilon
                 if wp.static(sensed):
                     jump = mix(jump, plain * epsilon, real(1.0), sensor[a], sensor[b])
@@ -358,7 +368,8 @@ class PairPotentials:
             softest[group] = min(M, softest.get(group, M))
         self._moduli = wp.array([softest[group] for group in groups], dtype=space.real, device=device)
         self.rows = packed_rows(space, n if simd else 0, _vectors(space, damped), device)
-        self._D = wp.zeros(n if damped and not simd else 0, dtype=space.mat, device=device)
+        rotating = n if damped and not simd else 0
+        self._rotation = wp.zeros(rotating, dtype=_of_rotation(space, self._stressed), device=device)
         self._particles = flux.particles
         flux.fields.tie = wp.zeros(n, dtype=space.mat, device=device)
         self._one = wp.ones(1, dtype=space.real, device=device)
@@ -383,8 +394,7 @@ class PairPotentials:
             self._launch(kernel, len(v), arguments)
             return
         if damped:
-            self._launch(_make_spatial(self.space), len(v), [state.F, grad_v, self._D])
+            self._launch(_make_spatial(self.space, stressed), len(v), [state.F, grad_v, self._rotation])
         kernel = _make_portable(self.space, damped, stressed, sums.sensor is not None, dual, self._yielding)
-        sensor = v if sums.sensor is None else sums.sensor
-        arguments = [reference, near, state.x, state.F, v, grad_v, self._D, sensor, self._particles, self._moduli]
-        self._launch(kernel, len(v), [*arguments, epsilon, flux, forces])
+        moving = [state.x, state.F, v, grad_v, self._rotation, v if sums.sensor is None else sums.sensor]
+        self._launch(kernel, len(v), [reference, near, *moving, self._particles, self._moduli, epsilon, flux, forces])

@@ -220,8 +220,8 @@ class Configuration:
     def renew(self, v: wp.array | None = None, sums: wp.array | None = None) -> None:
         """Last part of a refresh, launches only: the neighbours, pair weights and corrections (M3).
 
-        And the ``sums`` of ∇_k v, (n,) of mat, instead of those of masses (M7), if given, where ``sums_with_weights``;
-        ``finish_gradient`` does the rest.
+        And the ``sums`` of ∇_k v, (n,) of mat, instead of those of masses (M7), if given; ``finish_gradient`` does the
+        rest.
         """
         self.lists.fill(self.fields.x)
         self._weigh(v, sums)
@@ -270,20 +270,17 @@ class Configuration:
         if self.fixed and self.tilt is None:
             self._launch(_make_resolve(self.space), len(self.K), [self.particles, self.fields, self._steeper])
 
-    @property
-    def sums_with_weights(self) -> bool:
-        """Whether ``renew`` can sum a gradient in the pass that makes weights."""
-        return self.simd and self.weight.slope_cpp is not None
-
     def _weigh(self, v: wp.array | None = None, sums: wp.array | None = None) -> None:
         n, fields, near, of_v = len(self.K), self.fields, self.near, sums is not None
-        if self.sums_with_weights:
+        found = [v if of_v else fields.x, self.K, sums if of_v else self.K]
+        if self.simd and self.weight.slope_cpp is not None:
             rows = self.packed(VECTORS)
-            self._launch(make_pack(self.space, of_v), n, [self.particles, fields, v if of_v else fields.x, rows])
-            arguments = [fields, near, rows, self.K, sums if of_v else self.K]
+            self._launch(make_pack(self.space, of_v), n, [self.particles, fields, found[0], rows])
+            arguments = [fields, near, rows, *found[1:]]
             self._launch(make_pair_sums_simd(self.weight, self.space, of_v), n, arguments)
         else:
-            self._launch(make_pair_sums(self.weight, self.space), n, [self.particles, fields, near, self.K])
+            kernel = make_pair_sums(self.weight, self.space, of_v)
+            self._launch(kernel, n, [self.particles, fields, near, *found])
         for interpolation in self._interpolations.values():
             interpolation.refresh()
 

@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from ..boundaries.base import Assembly, Region
-from ..execution import Launcher
+from ..execution import Launcher, device_of
 from ..fields import allocate, structure
 from ..order import Order
 from ..space import Space
@@ -185,7 +185,7 @@ class ConservationLaw:
         if np.shape(U) != (n,):
             raise ValueError(f"initial values must have shape ({n},), got {np.shape(U)}")
         self.space = space = Space(dim, dtype, periodic is not None)
-        self.device, self.scheme, self.n, self.t = wp.get_device(device), scheme, n, 0.0
+        self.device, self.scheme, self.n, self.t = device_of(device), scheme, n, 0.0
         self.flux, self._function, self._launch = flux, flux, Launcher(device)
         if isinstance(flux, LinearAdvection):
             if len(flux.velocity) != dim:

@@ -9,7 +9,7 @@ import warp as wp
 from ..execution import Launcher
 from ..fields import neighbour_structure, structure
 from ..operators.row_sums import outer_sum
-from ..simd import BY_TWO, BY_TWO_DUAL, packed_rows, prelude
+from ..simd import BY_TWO, BY_TWO_DUAL, four_of, packed_rows, prelude
 from ..space import Space, difference
 from .reference import Configuration
 
@@ -34,30 +34,60 @@ SHARE = 1.0 / 3.0
 
 
 @functools.cache
+def pack_columns(space: Space) -> wp.Function:
+    """``wp.func`` (a, R, x, rows): columns of a matrix, each with a coordinate of x beside it, into row a."""
+    real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
+
+    @wp.func
+    def pack_columns(a: int, R: mat, x: vec, rows: wp.array2d(dtype=real)):
+        for j in range(wp.static(dim)):
+            rows[a, 4 * j + 3] = x[j]
+            for i in range(wp.static(dim)):
+                rows[a, 4 * j + i] = R[i, j]
+
+    return pack_columns
+
+
+@functools.cache
+def unpack_columns(space: Space) -> wp.Function:
+    """``wp.func`` (rows, a) -> the matrix and the x of row a (``pack_columns``)."""
+    real, vec, mat, dim, four = space.real, space.vec, space.mat, space.dim, four_of(space)
+
+    @wp.func
+    def unpack_columns(rows: wp.array2d(dtype=real), a: int):
+        R, x = mat(), vec()
+        for j in range(wp.static(dim)):
+            column = four(rows, a, j)
+            x[j] = column[3]
+            for i in range(wp.static(dim)):
+                R[i, j] = column[i]
+        return R, x
+
+    return unpack_columns
+
+
+@functools.cache
 def turned_sum(space: Space, simd: bool, dual: bool) -> wp.Function:
     """``wp.func`` (a, near, rows, x) -> Σ_b w (R_b ξ) ⊗ ξ, R_b a matrix in packed rows with x; w own or ``dual`` (M17).
 
     Rows hold the columns of R, each with a coordinate of x beside it (``pack_columns``).
     """
-    real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
+    real, vec, mat = space.real, space.vec, space.mat
     Neighbours, separation = neighbour_structure(space), difference(space)
     if not simd:
+        unpack = unpack_columns(space)
 
         @wp.func
         def turned_sum(a: int, near: Neighbours, rows: wp.array2d(dtype=real), x: wp.array(dtype=vec)):
             x_a = x[a]
             sums = mat()
             for k in range(near.start[a], near.stop[a], near.stride):
-                b = near.index[k]
-                xi = separation(x[b], x_a, near.box)
-                turned = vec()
-                for j in range(wp.static(dim)):
-                    for i in range(wp.static(dim)):
-                        turned[i] += rows[b, 4 * j + i] * xi[j]
+                R_b, x_b = unpack(rows, near.index[k])
+                xi = separation(x_b, x_a, near.box)
                 w = near.own[k]
                 if wp.static(dual):
                     w = near.w[k] + (near.w[k] - w)
-                sums += wp.outer(turned, xi * w)
+                sums += wp.outer(R_b @ xi, xi * w)
             return sums
 
         return turned_sum
@@ -126,21 +156,6 @@ def turned_sum(space: Space, simd: bool, dual: bool) -> wp.Function:
 
 
 @functools.cache
-def pack_columns(space: Space) -> wp.Function:
-    """``wp.func`` (a, R, x, rows): columns of a matrix, each with a coordinate of x beside it, into row a."""
-    real, vec, mat, dim = space.real, space.vec, space.mat, space.dim
-
-    @wp.func
-    def pack_columns(a: int, R: mat, x: vec, rows: wp.array2d(dtype=real)):
-        for j in range(wp.static(dim)):
-            rows[a, 4 * j + 3] = x[j]
-            for i in range(wp.static(dim)):
-                rows[a, 4 * j + i] = R[i, j]
-
-    return pack_columns
-
-
-@functools.cache
 def make_pack(space: Space) -> wp.Kernel:
     """Kernel: Π = Q Lᵀ (M5) into packed rows."""
     real, mat, pack_matrix = space.real, space.mat, pack_columns(space)
@@ -194,10 +209,10 @@ def _make_sharpen(space: Space, simd: bool) -> wp.Kernel:
 
 
 @functools.cache
-def _make_stress(space: Space, simd: bool) -> wp.Kernel:
+def _make_stress(space: Space, simd: bool, packed: bool) -> wp.Kernel:
     """Kernel: Π̃ = Q̃ Lᵀ with Q̃ = Q + ⅓ (Q − Σ_b V_b g_ba (Π_b ξ) ⊗ ξ), the adjoint of ∇̃ (M23).
 
-    Into packed rows with ``simd``, into an array without.
+    Into ``packed`` rows, or into an array.
     """
     real, mat = space.real, space.mat
     Reference, Neighbours = structure(space, "Reference"), neighbour_structure(space)
@@ -216,7 +231,7 @@ def _make_stress(space: Space, simd: bool) -> wp.Kernel:
         a = first + wp.tid()
         sharp = Q[a] + (Q[a] - sum_of(a, near, rows, reference.x)) * real(SHARE)
         Pi_a = sharp @ wp.transpose(reference.L[a])
-        if wp.static(simd):
+        if wp.static(packed):
             pack(a, Pi_a, reference.x[a], out)
         else:
             Pi[a] = Pi_a
@@ -231,16 +246,16 @@ class Sharpener:
         within: rows whose memory it may use (``packed_rows``), which are made anew before they are read again.
 
     Attributes:
-        stress_rows: Π̃ in packed rows, after ``stress``; empty without SIMD kernels.
+        stress_rows: Π̃ in packed rows, after ``stress``.
     """
 
     def __init__(
         self, space: Space, configuration: Configuration, n: int, device: wp.DeviceLike, within: wp.array | None = None
     ):
         self.space, self.configuration, self._launch = space, configuration, Launcher(device)
-        simd = configuration.simd
-        rows = packed_rows(space, 2 * n if simd else n, space.dim, device, within)
-        self._rows, self.stress_rows = rows[:n], rows[n:] if simd else packed_rows(space, 0, space.dim, device)
+        rows = packed_rows(space, 2 * n, space.dim, device, within)
+        self._rows, self.stress_rows = rows[:n], rows[n:]
+        self._no_Pi = wp.zeros(0, dtype=space.mat, device=device)
 
     def gradient(self, f: wp.array, out: wp.array) -> None:
         """``out`` ← ∇̃f of ``f``, both of vec and mat, (n,)."""
@@ -248,20 +263,21 @@ class Sharpener:
         self._launch(_make_gradient(self.space, simd), len(f), [reference, near, f, self._rows])
         self._launch(_make_sharpen(self.space, simd), len(f), [reference, near, self._rows, out])
 
-    def stress(self, Q: wp.array, Pi: wp.array) -> None:
-        """Π̃ from Q, (n,) of mat: into ``stress_rows``, or into ``Pi`` without SIMD kernels."""
-        self._sharpen(Q, Pi, self.configuration.simd)
+    def stress(self, Q: wp.array) -> None:
+        """Π̃ from Q, (n,) of mat, into ``stress_rows``."""
+        self._sharpen(Q, self._no_Pi, self.configuration.simd, packed=True)
 
     def unit(self) -> wp.array:
         """Π̃ of a unit stress, (n,) of mat, whose dual divergence is −e_a."""
         n = len(self._rows)
         Q = wp.full(n, np.eye(self.space.dim), dtype=self.space.mat, device=self._rows.device)
         Pi = wp.zeros_like(Q)
-        self._sharpen(Q, Pi, simd=False)
+        self._sharpen(Q, Pi, simd=False, packed=False)
         self._launch.forget()  # Q, which would stay with its launches
         return Pi
 
-    def _sharpen(self, Q: wp.array, Pi: wp.array, simd: bool) -> None:
+    def _sharpen(self, Q: wp.array, Pi: wp.array, simd: bool, packed: bool) -> None:
         reference, near, n = self.configuration.fields, self.configuration.near, len(Q)
         self._launch(make_pack(self.space), n, [reference, Q, self._rows])
-        self._launch(_make_stress(self.space, simd), n, [reference, near, Q, self._rows, self.stress_rows, Pi])
+        arguments = [reference, near, Q, self._rows, self.stress_rows, Pi]
+        self._launch(_make_stress(self.space, simd, packed), n, arguments)

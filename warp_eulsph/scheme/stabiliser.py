@@ -43,7 +43,8 @@ class Sums:
         forces: written.
         epsilon: share of the upwind flux (M9), 0 where nothing dissipates.
         sensor: (n,) of vec in [0, 1] that switches M9 to first order; None without.
-        grad_p: ∇_k p (M4), written too; None where nobody asks (``Stabiliser.sums_pressure``).
+        p: pressure in the reference, (n,) of one real, and grad_p: ∇_k p (M4), written too; None where nobody asks
+            (``Stabiliser.sums_pressure``).
     """
 
     configuration: Configuration
@@ -52,6 +53,7 @@ class Sums:
     forces: ForceArrays
     epsilon: float = 0.0
     sensor: wp.array | None = None
+    p: wp.array | None = None
     grad_p: wp.array | None = None
 
 

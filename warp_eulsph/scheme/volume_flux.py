@@ -15,21 +15,8 @@ from ..simd import BY_EIGHT, OWN_ROW, prelude
 from ..space import Space, difference
 from ..structs import ClockArrays, ParticleArrays
 from .flux import Flux
-from .pair_forces import pressure_of
+from .pair_forces import make_pressure
 from .stabiliser import Sums
-
-
-@functools.cache
-def _make_pressure(space: Space) -> wp.Kernel:
-    """Kernel: p of the stress in the reference."""
-    row, Flux, of_stress = space.row(1), structure(space, "Flux"), pressure_of(space)
-
-    @wp.kernel(module="unique", enable_backward=False)
-    def pressure(first: int, flux: Flux, out: wp.array(dtype=row)):
-        a = first + wp.tid()
-        out[a] = row(of_stress(flux.Q[a]))
-
-    return pressure
 
 
 @functools.cache
@@ -204,30 +191,31 @@ class VolumeFlux:
     """M24 at work on one medium of fluids.
 
     Attributes:
-        grad_p: ∇_k p (M4), (n,) of one row of dim reals; those who sum forces may have left it.
+        p: pressure [Pa] of the stress in the reference, (n,) of one real. grad_p: ∇_k p (M4), (n,) of one row of dim
+            reals. Those who sum forces may have left both.
     """
 
     def __init__(self, space: Space, flux: Flux, particles: ParticleArrays, change: wp.array, device: wp.DeviceLike):
         self.space, self.flux, self.particles, self.change = space, flux, particles, change
         self._launch, n = Launcher(device), len(change)
-        self._p = wp.zeros(n, dtype=space.row(1), device=device)
+        self.p = wp.zeros(n, dtype=space.row(1), device=device)
         self.grad_p = wp.zeros(n, dtype=space.row_gradient(1), device=device)
 
     def find(self, sums: Sums, exact: Callable[[wp.array], wp.array], clock: ClockArrays) -> None:
         """ΔV/V of the step, by the pressures that it was made with."""
         configuration, n = sums.configuration, len(self.change)
-        self._launch(_make_pressure(self.space), n, [sums.flux, self._p])
         if sums.grad_p is None:
-            configuration.gradient(self._p, self.grad_p)
+            self._launch(make_pressure(self.space), n, [sums.flux, self.p])
+            configuration.gradient(self.p, self.grad_p)
         gradient = exact(self.grad_p)
         fields, near = configuration.fields, configuration.near
         if configuration.simd:
             rows = configuration.packed(VECTORS)
-            self._launch(_make_pack(self.space), n, [fields, sums.flux, self._p, gradient, rows])
+            self._launch(_make_pack(self.space), n, [fields, sums.flux, self.p, gradient, rows])
             arguments = [near, rows, sums.epsilon, clock, self.change]
             self._launch(_make_exchange_simd(self.space), n, arguments)
             return
-        arguments = [fields, near, sums.flux, self._p, gradient, sums.epsilon, clock, self.change]
+        arguments = [fields, near, sums.flux, self.p, gradient, sums.epsilon, clock, self.change]
         self._launch(_make_exchange(self.space), n, arguments)
 
     def take(self, F: wp.array) -> None:
