@@ -132,8 +132,8 @@ def test_steps_in_other_threads_touch_no_signals():
 
 
 def test_holding_signals_costs_next_to_nothing():
-    whole, begin = Whole(), time.perf_counter()
+    whole, begin = Whole(), time.thread_time()
     for _ in range(1000):
         with whole:
             pass
-    assert (time.perf_counter() - begin) / 1000 < 50e-6  # s; a step takes a millisecond
+    assert (time.thread_time() - begin) / 1000 < 50e-6  # s of its own, whatever else runs; a step takes a millisecond
