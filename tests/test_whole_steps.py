@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from kept_runs import plate, recording
 
 import warp_eulsph as es
+from warp_eulsph import turns, whole
 from warp_eulsph.output import record, write_snapshot
 from warp_eulsph.output.checkpoint import take
 from warp_eulsph.whole import BrokenError, Whole
@@ -106,6 +107,26 @@ def test_a_second_signal_breaks_in_at_once_and_is_not_forgotten():
         whole.check()
     whole.mend()
     whole.check()
+
+
+def test_a_signal_that_comes_with_the_turn_does_not_keep_it(monkeypatch):
+    """Ctrl-C when the lock has just been taken waits as one in the block does, and other threads go on."""
+
+    class Late(turns.Turn):
+        def __enter__(self):
+            super().__enter__()
+            signal.raise_signal(signal.SIGINT)
+
+    turn, reached = Late(), False
+    monkeypatch.setattr(whole, "turn", turn)
+    with pytest.raises(KeyboardInterrupt), whole.Whole():
+        reached = True
+    assert reached and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    got: list[bool] = []
+    thread = threading.Thread(target=lambda: got.append(turn._lock.acquire(timeout=1.0)))
+    thread.start()
+    thread.join()
+    assert got == [True]
 
 
 def test_signals_of_others_are_left_alone():

@@ -51,7 +51,21 @@ class Whole:
                 "a step must not be taken within a tape, got a wp.Tape that records: kernels have no backward pass, so "
                 "that gradients would be zero; leave the tape, and take derivatives by differences of runs"
             )
-        turn.__enter__()
+        self._hold_back()  # before the turn is taken: a signal in between would leave it taken for good
+        try:
+            turn.__enter__()
+        except BaseException:  # a second signal, while others had their turn
+            self._release()
+            raise
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if kind is not None:
+            self.broken = f"{kind.__name__}: {error}" if str(error) else kind.__name__
+        turn.__exit__()
+        self._release()
+
+    def _hold_back(self) -> None:
+        """Hold signals back, in the main thread."""
         if threading.current_thread() is not threading.main_thread():
             return
         before = signal.getsignal(signal.SIGINT)
@@ -59,20 +73,15 @@ class Whole:
             self._before, self._held = before, 0
             signal.signal(signal.SIGINT, self._hold)
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        if kind is not None:
-            self.broken = f"{kind.__name__}: {error}" if str(error) else kind.__name__
-        turn.__exit__()
-        if self._before is not None:
-            self._release()
-
     def _hold(self, number: int, frame: FrameType | None) -> None:
         self._held += 1
         if self._held > 1:  # somebody does not want to wait
             self._release()
 
     def _release(self) -> None:
-        """Give the signal back to who had it before, and pass on what came meanwhile."""
+        """Give the signal back to who had it before, if it is held, and pass on what came meanwhile."""
+        if self._before is None:
+            return
         before, self._before = self._before, None
         signal.signal(signal.SIGINT, before)
         held, self._held = self._held, 0
