@@ -32,7 +32,7 @@ from .scheme.time_step import DeviceClock, TimeStep
 from .scheme.world import Parts
 from .sorting import Sorting
 from .space import Space
-from .turns import in_turn
+from .turns import alone, in_turn
 from .weights import Weight
 from .whole import Whole
 
@@ -226,6 +226,7 @@ class Simulation(Looks):
             if self.watch is not None:
                 self.watch(self)
 
+    @alone
     def _take_steps(self, most: int | None) -> None:
         self.whole.check()
         with self.whole:
