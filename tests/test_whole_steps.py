@@ -15,6 +15,7 @@ from kept_runs import plate, recording
 import warp_eulsph as es
 from warp_eulsph.output import record, write_snapshot
 from warp_eulsph.output.checkpoint import take
+from warp_eulsph.scheme.graphs import StepGraphs
 from warp_eulsph.whole import BrokenError, Whole
 
 
@@ -117,6 +118,29 @@ def test_a_third_signal_does_not_hide_the_second():
         signal.raise_signal(signal.SIGINT)
     with pytest.raises(BrokenError, match="by KeyboardInterrupt"):
         whole.check()
+
+
+def test_a_recording_of_a_graph_is_not_broken_into(monkeypatch):
+    """It would go on for ever, in all that is launched; so signals wait for the end of the step here."""
+    simulation, expected = plate(), plate()
+    simulation.by_graphs = expected.by_graphs = True
+    record, recorded = StepGraphs._record, []
+
+    def signalled(self, due):
+        for _ in range(3):
+            signal.raise_signal(signal.SIGINT)
+        record(self, due)
+        recorded.append(due)
+
+    simulation.step(3)  # one of each kind by the host
+    monkeypatch.setattr(StepGraphs, "_record", signalled)
+    with pytest.raises(KeyboardInterrupt):
+        simulation.step(9)
+    monkeypatch.undo()
+    assert recorded and simulation.whole.broken is None and not simulation.device.is_capturing
+    simulation.step(12 - simulation.steps)
+    expected.step(12)
+    assert bits(simulation) == bits(expected)
 
 
 def test_signals_of_others_are_left_alone():

@@ -2,6 +2,8 @@
 
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -10,6 +12,23 @@ import warp as wp
 
 class BrokenError(RuntimeError):
     """A simulation is asked to go on from the middle of a step, which something broke into."""
+
+
+_undivided = False
+
+
+@contextmanager
+def undivided() -> Iterator[None]:
+    """What is short and would leave the whole process in disorder, within a step: a second signal waits here too.
+
+    A recording that is broken into goes on for ever, and takes in what any simulation launches.
+    """
+    global _undivided
+    _undivided = True
+    try:
+        yield
+    finally:
+        _undivided = False
 
 
 class Whole:
@@ -67,7 +86,7 @@ class Whole:
 
     def _hold(self, number: int, frame: FrameType | None) -> None:
         self._held += 1
-        if self._held > 1:  # somebody does not want to wait
+        if self._held > 1 and not _undivided:  # somebody does not want to wait
             # Noted here too: a third one may come before __exit__
             before, self.broken = self.broken, KeyboardInterrupt.__name__
             self._release()
