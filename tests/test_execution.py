@@ -4,6 +4,8 @@ import os
 import platform
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -270,3 +272,24 @@ def test_a_weight_without_its_slope_in_cpp_runs_beside_simd_kernels():
         for weight in (OwnWeight(), es.WendlandC2())
     )
     assert_equal_to_round_off(own, given, wp.float64)
+
+
+def test_what_breaks_into_a_launch_leaves_no_thread_at_work(monkeypatch):
+    """It would write into what is launched next."""
+    monkeypatch.setattr(execution, "_threads", 2)
+    monkeypatch.setattr(execution, "_pool", None)
+    started, done = threading.Event(), []
+
+    class Command:
+        def launch(self):
+            if threading.current_thread() is threading.main_thread():
+                started.wait()
+                raise KeyboardInterrupt
+            started.set()
+            time.sleep(0.05)
+            done.append(True)
+
+    with pytest.raises(KeyboardInterrupt):
+        execution._together([Command(), Command()])
+    assert done
+    execution._pool.shutdown()

@@ -18,6 +18,7 @@ from warp_eulsph.boundaries import Bound, Boundary
 from warp_eulsph.materials import J2, Failing, LinearHardening, PrincipalStrain
 from warp_eulsph.output import Recording, Run, record
 from warp_eulsph.schedule import EveryTime
+from warp_eulsph.settling import residual
 
 SIDE, RUNS = {1: 20, 2: 6, 3: 4}, 3
 FOLLOWING = [es.Never(), es.Every(3), es.Always()]
@@ -222,6 +223,19 @@ def test_one_that_fails_ends_alone(reference, graphs, caplog):
     total, energy = together.energy(), together.runs.energy()
     assert total["kinetic"] == energy["kinetic"][[0, 2]].sum() and np.isfinite(list(total.values())).all()
     assert np.isfinite(together.momentum()).all()
+
+
+def test_reactions_and_equilibria_are_of_those_that_are_well():
+    """An equilibrium is that of each: the largest residual of those alone."""
+    loads = [es.Fixed(lambda X: X[:, 0] % 2.0 < 0.2), es.BodyForce(swing_slowly), es.Damping(rate=50.0), *BLOW]
+    together = es.Simulation([run(k) for k in range(RUNS)], boundaries=loads, independent=True)
+    others = [es.Simulation(run(k), boundaries=loads) for k in (0, 2)]
+    for simulation in (together, *others):
+        list(simulation.frames([0.006]))
+        simulation.step(3)
+    assert together.runs.failures[1] is not None
+    assert np.isclose(together.reaction(loads[0]), sum(other.reaction(loads[0]) for other in others), rtol=1e-13).all()
+    assert residual(together) == max(residual(other) for other in others)
 
 
 def test_the_last_one_that_fails_is_raised():

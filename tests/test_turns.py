@@ -72,15 +72,45 @@ def test_who_steps_on_and_on_lets_others_in():
 
 def test_a_turn_may_be_taken_again_by_who_has_it():
     turn, order = Turn(), []
-    with turn:
-        with turn:
-            order.append("inner")
-        other = threading.Thread(target=lambda: turn.__enter__() or order.append("other") or turn.__exit__())
+    with turn.lock:
+        turn.call(order.append, "inner")
+        other = threading.Thread(target=turn.call, args=(order.append, "other"))
         other.start()
         other.join(0.05)
         order.append("outer")
     other.join()
     assert order == ["inner", "outer", "other"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no such clock")
+def test_ctrl_c_at_any_moment_leaves_the_turn_to_others():
+    """Signals by a clock, whose handler breaks in as that of Ctrl-C does."""
+    turn, hits, armed = Turn(), 0, False
+
+    def break_in(number, frame):
+        nonlocal armed
+        if armed:
+            armed = False
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, break_in)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 1e-4, 5e-5)
+        while hits < 3000:
+            try:
+                armed = True
+                turn.call(len, "")
+                armed = False
+            except KeyboardInterrupt:
+                hits += 1
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    got: list[bool] = []
+    other = threading.Thread(target=lambda: got.append(turn.lock.acquire(timeout=1.0)))
+    other.start()
+    other.join()
+    assert got == [True]
 
 
 @pytest.mark.of_the_cpu

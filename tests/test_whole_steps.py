@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from kept_runs import plate, recording
 
 import warp_eulsph as es
-from warp_eulsph import turns, whole
 from warp_eulsph.output import record, write_snapshot
 from warp_eulsph.output.checkpoint import take
+from warp_eulsph.scheme.graphs import StepGraphs
 from warp_eulsph.whole import BrokenError, Whole
 
 
@@ -109,24 +109,38 @@ def test_a_second_signal_breaks_in_at_once_and_is_not_forgotten():
     whole.check()
 
 
-def test_a_signal_that_comes_with_the_turn_does_not_keep_it(monkeypatch):
-    """Ctrl-C when the lock has just been taken waits as one in the block does, and other threads go on."""
+def test_a_third_signal_does_not_hide_the_second():
+    """It may come before the end of the block is told."""
+    whole = Whole()
+    whole.__enter__()
+    signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    with pytest.raises(BrokenError, match="by KeyboardInterrupt"):
+        whole.check()
 
-    class Late(turns.Turn):
-        def __enter__(self):
-            super().__enter__()
+
+def test_a_recording_of_a_graph_is_not_broken_into(monkeypatch):
+    """It would go on for ever, in all that is launched; so signals wait for the end of the step here."""
+    simulation, expected = plate(), plate()
+    simulation.by_graphs = expected.by_graphs = True
+    record, recorded = StepGraphs._record, []
+
+    def signalled(self, due):
+        for _ in range(3):
             signal.raise_signal(signal.SIGINT)
+        record(self, due)
+        recorded.append(due)
 
-    turn, reached = Late(), False
-    monkeypatch.setattr(whole, "turn", turn)
-    with pytest.raises(KeyboardInterrupt), whole.Whole():
-        reached = True
-    assert reached and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    got: list[bool] = []
-    thread = threading.Thread(target=lambda: got.append(turn._lock.acquire(timeout=1.0)))
-    thread.start()
-    thread.join()
-    assert got == [True]
+    simulation.step(3)  # one of each kind by the host
+    monkeypatch.setattr(StepGraphs, "_record", signalled)
+    with pytest.raises(KeyboardInterrupt):
+        simulation.step(9)
+    monkeypatch.undo()
+    assert recorded and simulation.whole.broken is None and not simulation.device.is_capturing
+    simulation.step(12 - simulation.steps)
+    expected.step(12)
+    assert bits(simulation) == bits(expected)
 
 
 def test_signals_of_others_are_left_alone():
@@ -138,8 +152,10 @@ def test_signals_of_others_are_left_alone():
             with whole:
                 signal.raise_signal(signal.SIGINT)
                 assert not seen
+            with whole:
+                signal.raise_signal(signal.SIGINT), signal.raise_signal(signal.SIGINT)
             assert signal.getsignal(signal.SIGINT) is handler and whole.broken is None
-            assert len(seen) == callable(handler)
+            assert len(seen) == 3 * callable(handler)
         finally:
             signal.signal(signal.SIGINT, before)
 

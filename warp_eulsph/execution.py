@@ -11,7 +11,7 @@ threads; 0 or 1).
 
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import pairwise
 from typing import Any
 
@@ -63,7 +63,7 @@ def set_threads(count: int | None = None) -> None:
     global _threads, _pool
     if count is not None and count < 1:
         raise ValueError(f"threads must be at least 1, got {count}; None takes all cores")
-    with turn:
+    with turn.lock:
         if _pool is not None:
             _pool.shutdown()
         _threads, _pool = cores() if count is None else count, None
@@ -142,12 +142,12 @@ class Launcher:
         write to its own particle only.
         """
         if n:
-            with turn:
+            with turn.lock:
                 _together(self._commands(kernel, _ranges_on(self.device, n, each), arguments, first))
 
     def once(self, kernel: wp.Kernel, dim: int, arguments: Sequence[Any]) -> None:
         """Launch a kernel of ``dim`` threads, few, that has no such parameter, in one piece."""
-        with turn:
+        with turn.lock:
             self._commands(kernel, ((0, dim),), arguments, None)[0].launch()
 
     def forget(self) -> None:
@@ -171,7 +171,7 @@ def launch(kernel: wp.Kernel, n: int, arguments: Sequence[Any], device: wp.Devic
     """Launch as a ``Launcher`` does, once, for arguments that will not come again."""
     device = wp.get_device(device)
     if n:
-        with turn:
+        with turn.lock:
             _together(_recorded(kernel, _ranges_on(device, n), arguments, first, device))
 
 
@@ -197,7 +197,10 @@ def _together(commands: list[Any]) -> None:
     # A launch on the CPU releases the interpreter's lock while it runs; whoever is free takes the next range.
     rest = iter(commands)
     waiting = [_workers().submit(_take, rest) for _ in range(min(_threads, len(commands)) - 1)]
-    _take(rest)
+    try:
+        _take(rest)
+    finally:  # whatever broke in: what still runs would write into what comes next
+        wait(waiting)
     for worker in waiting:
         worker.result()
 

@@ -32,7 +32,7 @@ from .scheme.time_step import DeviceClock, TimeStep
 from .scheme.world import Parts
 from .sorting import Sorting
 from .space import Space
-from .turns import in_turn
+from .turns import alone, in_turn
 from .weights import Weight
 from .whole import Whole
 
@@ -226,6 +226,7 @@ class Simulation(Looks):
             if self.watch is not None:
                 self.watch(self)
 
+    @alone
     def _take_steps(self, most: int | None) -> None:
         self.whole.check()
         with self.whole:
@@ -365,8 +366,13 @@ class Simulation(Looks):
         return self.runs.angular_momentum()[self.clock.well].sum(axis=0)
 
     def reaction(self, boundary: Boundary) -> np.ndarray:
-        """Force [N] that a velocity condition exerted on its particles, mean over the last step, (dim,)."""
+        """Force [N] that a velocity condition exerted on its particles, mean over the last step, (dim,).
+
+        Of independent runs it leaves out those that have failed.
+        """
         if boundary not in self.boundaries:
             raise ValueError(f"reaction: {boundary!r} is not one of simulation.boundaries; give one of these")
         numbers = self.conditions[self.boundaries.index(boundary)].indices
-        return self.stepper.forces.reaction.numpy()[self.order.places[numbers]].sum(axis=0)
+        reaction = self.order.by_number(self.stepper.forces.reaction.numpy())
+        well = np.repeat(self.clock.well, [len(own) for own in self.runs.ranges])
+        return reaction[numbers[well[numbers]]].sum(axis=0)

@@ -21,7 +21,7 @@ from .whole import Whole
 GROWN = 100.0
 
 
-@in_turn("advance")
+@in_turn()
 class Transport:
     """Runs a scalar conservation law in steps of one length; ``output.record`` takes it as it takes a ``Simulation``.
 

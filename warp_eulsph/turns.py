@@ -10,7 +10,6 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ContextDecorator
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -19,33 +18,37 @@ T = TypeVar("T")
 PAUSE = 2e-5
 
 
-class Turn(ContextDecorator):
-    """A lock that its thread may take again, and that is not taken at once from those who wait."""
+class Turn:
+    """Who has its lock launches kernels; a thread may take it again.
+
+    It is taken by ``with turn.lock``, or ``call``, which lets those go first who wait. Its lock is of C, which Ctrl-C
+    cannot come between and the block: an ``__enter__`` or ``__exit__`` of Python can be left with the lock taken for
+    good, and other threads would wait for ever.
+    """
 
     def __init__(self) -> None:
-        self.reset()
+        self.lock: Any = threading.RLock()
+        self._waiting: set[int] = set()
 
     def reset(self) -> None:
         """Make it as new, held by nobody."""
-        self._lock, self._depth = threading.RLock(), 0
-        self._waiting: set[int] = set()
+        self.lock._at_fork_reinit()
+        self._waiting.clear()
 
-    def __enter__(self) -> None:
-        if not self._lock.acquire(False):
-            me = threading.get_ident()
+    def call(self, function: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Call ``function`` in turn; afterwards those who wait have theirs."""
+        if self.lock._is_owned():
+            return function(*arguments, **options)
+        me = threading.get_ident()
+        try:
             self._waiting.add(me)
-            try:
-                self._lock.acquire()
-            finally:
+            with self.lock:
                 self._waiting.discard(me)
-        self._depth += 1
-
-    def __exit__(self, *_: Any) -> None:
-        self._depth -= 1
-        others = self._depth == 0 and self._waiting
-        self._lock.release()
-        if others:
-            time.sleep(PAUSE)
+                return function(*arguments, **options)
+        finally:
+            self._waiting.discard(me)
+            if self._waiting:
+                time.sleep(PAUSE)
 
 
 turn = Turn()
@@ -61,22 +64,23 @@ def in_turn(*but: str) -> Callable[[type[T]], type[T]]:
             if name in but or (name.startswith("_") and name != "__init__"):
                 continue
             if isinstance(member, property):
-                setter = member.fset and _alone(member.fset)
-                setattr(cls, name, property(member.fget and _alone(member.fget), setter, None, member.__doc__))
+                setter = member.fset and alone(member.fset)
+                setattr(cls, name, property(member.fget and alone(member.fget), setter, None, member.__doc__))
             elif callable(member):
-                setattr(cls, name, _alone(member))
+                setattr(cls, name, alone(member))
         return cls
 
     return decorate
 
 
-def _alone(function: Callable[..., Any]) -> Callable[..., Any]:
-    @functools.wraps(function)
-    def alone(*arguments: Any, **options: Any) -> Any:
-        with turn:
-            return function(*arguments, **options)
+def alone(function: Callable[..., T]) -> Callable[..., T]:
+    """Decorator: calls wait for their turn."""
 
-    return alone
+    @functools.wraps(function)
+    def in_turn(*arguments: Any, **options: Any) -> T:
+        return turn.call(function, *arguments, **options)
+
+    return in_turn
 
 
 def _begin_child() -> None:
@@ -85,4 +89,4 @@ def _begin_child() -> None:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(before=turn.__enter__, after_in_parent=turn.__exit__, after_in_child=_begin_child)
+    os.register_at_fork(before=turn.lock.acquire, after_in_parent=turn.lock.release, after_in_child=_begin_child)

@@ -2,23 +2,40 @@
 
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
 import warp as wp
-
-from .turns import turn
 
 
 class BrokenError(RuntimeError):
     """A simulation is asked to go on from the middle of a step, which something broke into."""
 
 
+_undivided = False
+
+
+@contextmanager
+def undivided() -> Iterator[None]:
+    """What is short and would leave the whole process in disorder, within a step: a second signal waits here too.
+
+    A recording that is broken into goes on for ever, and takes in what any simulation launches.
+    """
+    global _undivided
+    _undivided = True
+    try:
+        yield
+    finally:
+        _undivided = False
+
+
 class Whole:
-    """Guards what must not be left half done: ``with whole: step()``.
+    """Guards what must not be left half done: ``with whole: step()``. To be entered in turn (``turns``).
 
     SIGINT (Ctrl-C) is held back until the end, in the main thread; a second one breaks in at once. After any exception
-    in between, ``check`` raises until ``mend`` says that all is as it should be. Simulations in other threads wait.
+    in between, ``check`` raises until ``mend`` says that all is as it should be.
 
     Attributes:
         broken: what broke in, None while all is well.
@@ -51,17 +68,11 @@ class Whole:
                 "a step must not be taken within a tape, got a wp.Tape that records: kernels have no backward pass, so "
                 "that gradients would be zero; leave the tape, and take derivatives by differences of runs"
             )
-        self._hold_back()  # before the turn is taken: a signal in between would leave it taken for good
-        try:
-            turn.__enter__()
-        except BaseException:  # a second signal, while others had their turn
-            self._release()
-            raise
+        self._hold_back()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         if kind is not None:
             self.broken = f"{kind.__name__}: {error}" if str(error) else kind.__name__
-        turn.__exit__()
         self._release()
 
     def _hold_back(self) -> None:
@@ -75,8 +86,11 @@ class Whole:
 
     def _hold(self, number: int, frame: FrameType | None) -> None:
         self._held += 1
-        if self._held > 1:  # somebody does not want to wait
+        if self._held > 1 and not _undivided:  # somebody does not want to wait
+            # Noted here too: a third one may come before __exit__
+            before, self.broken = self.broken, KeyboardInterrupt.__name__
             self._release()
+            self.broken = before  # whose signal it is goes on
 
     def _release(self) -> None:
         """Give the signal back to who had it before, if it is held, and pass on what came meanwhile."""

@@ -10,6 +10,7 @@ import warp as wp
 
 from ..boundaries import Bound
 from ..interactions import BoundInteraction
+from ..whole import undivided
 from .refresh import ByGraph
 from .stepper import Stepper
 
@@ -68,7 +69,7 @@ class StepGraphs:
 
     def _graph(self, due: tuple[int, ...]) -> wp.Graph:
         if due not in self._graphs:
-            with wp.ScopedCapture(self.stepper.device) as capture:
+            with undivided(), wp.ScopedCapture(self.stepper.device) as capture:
                 self._record(due)
             self._graphs[due] = capture.graph
         return self._graphs[due]
