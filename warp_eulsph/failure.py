@@ -130,7 +130,7 @@ def _worst(simulation: Failing, place: int, among: range) -> tuple[int, str]:
     elif J <= 0.0:
         what = f"det F = {J:.4g}, must be positive"
     elif finite:
-        what = f"no state that its material allows, {_history(simulation, particle)}, {F}"
+        what = ", ".join(["no state that its material allows", *_history(simulation, particle), F])
     else:
         what = f"non-finite values, v = {simulation.v[particle]}, {F}"
     n = len(among)
@@ -210,9 +210,9 @@ def place_of(body: str, x: np.ndarray) -> str:
     return f"of body {body!r} at x = {np.array2string(x, precision=6)} m"
 
 
-def _history(simulation: Failing, particle: int) -> str:
+def _history(simulation: Failing, particle: int) -> list[str]:
     names = {variable.name for _, part in simulation.stepper.remembering for variable in part.law.history}
-    return ", ".join(f"{name} = {simulation.history(name)[particle].tolist()}" for name in sorted(names))
+    return [f"{name} = {simulation.history(name)[particle].tolist()}" for name in sorted(names)]
 
 
 def _fastest(simulation: Failing, among: range) -> int:
