@@ -19,6 +19,14 @@ from warp_eulsph.scheme.graphs import StepGraphs
 from warp_eulsph.whole import BrokenError, Whole
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _listening():
+    """To Ctrl-C, which a process that a shell started in the background ignores."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def driven(failing=lambda call: None):
     """A plate under a load that the host gives; ``failing`` is told the number of each call."""
     calls = iter(range(10**9))
